@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/data/frames.h"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+
+namespace pagesweep {
+
+int width_of(const GrayImage& image) {
+  return std::visit([](const auto& pixels) { return pixels.width(); }, image);
+}
+
+int height_of(const GrayImage& image) {
+  return std::visit([](const auto& pixels) { return pixels.height(); }, image);
+}
+
+int Frames::dropped() const {
+  return static_cast<int>(std::count_if(images_.begin(), images_.end(), [](const auto& image) { return !image; }));
+}
+
+void Frames::set(int i, GrayImage image) {
+  if (i < 0 || i >= count()) throw std::invalid_argument("Frames::set: no such frame");
+  if (width_of(image) != width() || height_of(image) != height())
+    throw std::invalid_argument("Frames::set: the frame's size is not the sequence's");
+  images_[static_cast<std::size_t>(i)] = std::move(image);
+}
+
+void Frames::read_row(int y, Image<float>& samples) const {
+  if (samples.width() != width() || samples.height() != count()) samples = Image<float>(width(), count());
+  const auto black = static_cast<float>(sequence_.black_level);
+  const auto clipped = static_cast<float>(sequence_.saturation);
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  for (int i = 0; i < count(); ++i) {
+    const auto out = samples.row(i);
+    if (!has(i)) {
+      std::fill(out.begin(), out.end(), std::numeric_limits<float>::quiet_NaN());
+      continue;
+    }
+    std::visit(
+        [&](const auto& image) {
+          const auto in = image.row(y);
+          for (std::size_t x = 0; x < in.size(); ++x) {
+            const auto gray = static_cast<float>(in[x]);
+            out[x] = gray >= clipped ? infinity : gray - black;
+          }
+        },
+        frame(i));
+  }
+}
+
+std::vector<Frames> read_all(FrameSource& source, Progress& progress) {
+  std::vector<Frames> cameras;
+  for (const Sequence& sequence : source.sequences()) cameras.emplace_back(sequence);
+  progress.begin("reading frames");
+  while (auto set = source.next()) {
+    for (std::size_t c = 0; c < cameras.size(); ++c)
+      if (set->images[c]) cameras[c].set(set->index, std::move(*set->images[c]));
+    if (!cameras.empty()) progress.advance((set->index + 1.0) / cameras[0].count());
+  }
+  return cameras;
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "pagesweep/base/image.h"
+#include "pagesweep/base/progress.h"
+
+namespace pagesweep {
+
+/// A single-channel picture as a matrix camera delivers it: linear light, 8 or 16 bit.
+using GrayImage = std::variant<Image<std::uint8_t>, Image<std::uint16_t>>;
+
+int width_of(const GrayImage& image);
+int height_of(const GrayImage& image);
+
+/// What is known about a camera's frames before the first one is there.
+struct Sequence {
+  std::string camera;
+  int width = 0;
+  int height = 0;
+  int count = 0;            ///< frame instants, dropped frames included
+  int bit_depth = 8;        ///< of the gray values: 1 to 16
+  double black_level = 0;   ///< gray value without light
+  double saturation = 255;  ///< first gray value that is clipped
+};
+
+/// The frames of one camera. frame(i) was exposed at time i [frames]; a dropped frame is absent.
+class Frames {
+ public:
+  Frames() = default;
+  explicit Frames(Sequence sequence)
+      : sequence_(std::move(sequence)), images_(static_cast<std::size_t>(sequence_.count)) {}
+
+  const Sequence& sequence() const { return sequence_; }
+  int width() const { return sequence_.width; }
+  int height() const { return sequence_.height; }
+  int count() const { return sequence_.count; }
+  bool has(int i) const { return images_[static_cast<std::size_t>(i)].has_value(); }
+  int dropped() const;
+  /// \throws std::invalid_argument  if i is out of range or the size is not the sequence's
+  void set(int i, GrayImage image);
+  const GrayImage& frame(int i) const { return *images_[static_cast<std::size_t>(i)]; }
+
+  /// The gray value sequences of a row of pixels, black level removed: samples(x, i) is pixel (x, y) at
+  /// frame i, NaN where the frame was dropped. A sample that is clipped is +infinity: it says "at least
+  /// saturation" and nothing more, and no station can mistake it for a measurement (eq. 10).
+  /// \param samples  count() rows of width() pixels
+  void read_row(int y, Image<float>& samples) const;
+
+ private:
+  Sequence sequence_;
+  std::vector<std::optional<GrayImage>> images_;
+};
+
+/// Simultaneous frames of all cameras; a camera whose frame was dropped has none.
+struct FrameSet {
+  int index = 0;  ///< [frames] time of exposure
+  std::vector<std::optional<GrayImage>> images;
+};
+
+/// Yields the simultaneous frames of all cameras, one instant after the other. A folder, a recording, the
+/// simulator and live cameras are all this; the pipeline cannot tell them apart.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  virtual const std::vector<Sequence>& sequences() const = 0;
+  /// The next instant, or nothing after the last one.
+  /// \throws Error  if a frame cannot be read
+  virtual std::optional<FrameSet> next() = 0;
+};
+
+/// Reads a source to its end: one Frames a camera, in the order of source.sequences().
+std::vector<Frames> read_all(FrameSource& source, Progress& progress = no_progress());
+
+}  // namespace pagesweep

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/data/page_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace pagesweep {
+namespace {
+
+/// Node (i, j), linearly extrapolated where it is beyond the grid's edge.
+Eigen::Vector3d node(const Image<Eigen::Vector3f>& nodes, int i, int j) {
+  const auto along_row = [&](int row) -> Eigen::Vector3d {
+    const int last = nodes.width() - 1;
+    const int inside = std::clamp(i, 0, last);
+    const Eigen::Vector3d at = nodes(inside, row).cast<double>();
+    if (inside == i || last == 0) return at;
+    const Eigen::Vector3d before = nodes(i < 0 ? 1 : last - 1, row).cast<double>();
+    return at + std::abs(i - inside) * (at - before);
+  };
+  const int last = nodes.height() - 1;
+  const int inside = std::clamp(j, 0, last);
+  const Eigen::Vector3d at = along_row(inside);
+  if (inside == j || last == 0) return at;
+  return at + std::abs(j - inside) * (at - along_row(j < 0 ? 1 : last - 1));
+}
+
+/// Catmull-Rom weights for the nodes at -1, 0, 1, 2 around a position at 0 <= x < 1.
+std::array<double, 4> catmull_rom(double x) {
+  return {x * (-0.5 + x * (1 - 0.5 * x)), 1 + x * x * (-2.5 + 1.5 * x), x * (0.5 + x * (2 - 1.5 * x)),
+          x * x * (-0.5 + 0.5 * x)};
+}
+
+}  // namespace
+
+Eigen::Vector3d interpolate(const PageSurface& surface, const Image<Eigen::Vector3f>& nodes, double s_mm, double t_mm) {
+  const auto cell = [](double position, int count) {
+    return static_cast<int>(std::clamp(std::floor(position), -1.0, std::max(0.0, count - 1.0)));
+  };
+  const double i = (s_mm - surface.s0_mm) / surface.spacing_mm;
+  const double j = (t_mm - surface.t0_mm) / surface.spacing_mm;
+  const int i0 = cell(i, nodes.width());
+  const int j0 = cell(j, nodes.height());
+  // Beyond the outermost extrapolated cell the interpolant goes on as a straight line.
+  const double di = std::clamp(i - i0, 0.0, 1.0);
+  const double dj = std::clamp(j - j0, 0.0, 1.0);
+  const auto wi = catmull_rom(di);
+  const auto wj = catmull_rom(dj);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int b = 0; b < 4; ++b)
+    for (int a = 0; a < 4; ++a)
+      sum += wi[static_cast<std::size_t>(a)] * wj[static_cast<std::size_t>(b)] * node(nodes, i0 - 1 + a, j0 - 1 + b);
+  if (const double beyond = i - i0 - di; beyond != 0) sum += beyond * (node(nodes, i0 + 1, j0) - node(nodes, i0, j0));
+  if (const double beyond = j - j0 - dj; beyond != 0) sum += beyond * (node(nodes, i0, j0 + 1) - node(nodes, i0, j0));
+  return sum;
+}
+
+}  // namespace pagesweep
