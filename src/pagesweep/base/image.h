@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 #include <memory>
 #include <new>
 #include <span>
@@ -43,13 +44,16 @@ class Image {
 
  public:
   Image() = default;
-  /// \throws std::invalid_argument  if a side is negative
-  Image(int width, int height, T fill = T{}) : width_(width), height_(height) {
-    if (width < 0 || height < 0) throw std::invalid_argument("an image's sides must not be negative");
-    data_.reset(static_cast<T*>(::operator new[](std::max<std::size_t>(1, size()) * sizeof(T), alignment)));
-    std::uninitialized_fill_n(data_.get(), size(), fill);
+  /// All bytes zero. \throws std::invalid_argument  if a side is negative
+  Image(int width, int height) : Image(Allocate{}, width, height) {
+    std::memset(static_cast<void*>(data()), 0, size() * sizeof(T));
   }
-  Image(const Image& other) : Image(other.width_, other.height_) { std::copy_n(other.data(), size(), data()); }
+  Image(int width, int height, T fill) : Image(Allocate{}, width, height) {
+    std::uninitialized_fill_n(data(), size(), fill);
+  }
+  Image(const Image& other) : Image(Allocate{}, other.width_, other.height_) {
+    std::uninitialized_copy_n(other.data(), size(), data());
+  }
   Image(Image&& other) noexcept { swap(other); }
   Image& operator=(Image other) noexcept {
     swap(other);
@@ -82,6 +86,11 @@ class Image {
   struct Delete {
     void operator()(T* data) const { ::operator delete[](data, alignment); }
   };
+  struct Allocate {};
+  Image(Allocate, int width, int height) : width_(width), height_(height) {
+    if (width < 0 || height < 0) throw std::invalid_argument("an image's sides must not be negative");
+    data_.reset(static_cast<T*>(::operator new[](std::max<std::size_t>(1, size()) * sizeof(T), alignment)));
+  }
   std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
   }
