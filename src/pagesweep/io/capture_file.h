@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pagesweep/camera/rig.h"
+#include "pagesweep/data/frames.h"
+
+namespace pagesweep {
+
+/// Where a camera's frames lie. Frame i is in the file whose number is first + i.
+struct SequenceFiles {
+  std::string camera;       ///< a camera of the rig
+  std::string frames;       ///< path with one %d or %06d for the number: "cam1/%06d.png"
+  int first = 0;            ///< number of frame 0
+  int count = 0;            ///< frame instants; a file that is missing is a dropped frame
+  int bit_depth = 8;        ///< of the gray values: 1 to 16
+  double black_level = 0;   ///< gray value without light
+  double saturation = 255;  ///< first gray value that is clipped
+};
+
+/// A recorded sweep (docs/formats.md, "Capture"). Its paths are as given: absolute, or relative to `folder`.
+struct Capture {
+  std::filesystem::path folder;  ///< where capture.json lies
+  std::filesystem::path rig = "rig.json";
+  std::vector<SequenceFiles> sequences;
+  std::optional<std::filesystem::path> scan;  ///< the scanner's own picture
+  std::string notes;
+
+  std::filesystem::path rig_path() const { return folder / rig; }
+  std::optional<std::filesystem::path> scan_path() const;
+  /// Path of one frame's file.
+  std::filesystem::path frame_path(const SequenceFiles& sequence, int i) const;
+};
+
+/// Reads a capture from its folder or from its capture.json.
+/// \throws Error  that names file, field and what was expected
+Capture read_capture(const std::filesystem::path& folder_or_file);
+
+/// Writes capture.folder / "capture.json".
+/// \throws Error  if it cannot be written
+void write_capture(const Capture& capture);
+
+/// The rig that a capture names.
+Rig read_capture_rig(const Capture& capture);
+
+/// What Frames and the stations need to know of a sequence that `camera` recorded.
+Sequence make_sequence(const SequenceFiles& files, const Camera& camera);
+
+/// The frames of a capture from its files, a few instants ahead and on all threads. A missing file is a dropped frame.
+/// next() throws Error if a frame is unreadable, cut short, not gray, or of another size or depth than announced.
+/// \throws Error  if the rig lacks a camera of the capture, or all frames of one are missing
+std::unique_ptr<FrameSource> open_capture(const Capture& capture, const Rig& rig);
+
+}  // namespace pagesweep
