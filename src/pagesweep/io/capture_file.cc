@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/io/capture_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "pagesweep/io/json_file.h"
+#include "pagesweep/io/json_reader.h"
+#include "pagesweep/io/rig_file.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr int most_frames = 100'000;     ///< a sweep has hundreds
+constexpr int highest_number = 1 << 30;  ///< first + count stays an int
+constexpr int most_digits = 12;
+
+/// A frame path cut at its one %d or %06d.
+struct FramePattern {
+  std::string before, after;
+  int digits = 0;
+
+  std::string path(int number) const { return fmt::format("{}{:0{}}{}", before, number, digits, after); }
+};
+
+/// Taken apart by hand: a pattern from a file must never reach printf.
+std::optional<FramePattern> parse_pattern(const std::string& text) {
+  const auto percent = text.find('%');
+  if (percent == std::string::npos || text.find('\0') != std::string::npos) return std::nullopt;
+  const auto conversion = text.find_first_not_of("0123456789", percent + 1);
+  if (conversion == std::string::npos || text[conversion] != 'd') return std::nullopt;
+  const std::string width = text.substr(percent + 1, conversion - percent - 1);
+  FramePattern pattern{text.substr(0, percent), text.substr(conversion + 1)};
+  if (pattern.after.find('%') != std::string::npos) return std::nullopt;
+  if (width.empty()) return pattern;
+  if (width.front() != '0' || width.size() > 3) return std::nullopt;
+  pattern.digits = std::stoi(width);
+  if (pattern.digits > most_digits) return std::nullopt;
+  return pattern;
+}
+
+std::filesystem::path read_path(const JsonReader& json) {
+  const std::string path = json.text();
+  if (path.empty() || path.find('\0') != std::string::npos) throw json.error("expected a file's path");
+  return path;
+}
+
+SequenceFiles read_sequence(const JsonReader& json) {
+  SequenceFiles files;
+  files.camera = json.at("camera").text();
+  files.frames = json.at("frames").text();
+  if (!parse_pattern(files.frames))
+    throw json.at("frames").error(
+        fmt::format("expected a path with one %d or %06d where the frame's number stands and no other %, found \"{}\"",
+                    files.frames));
+  const auto first = json.find("first");
+  files.first = first ? first->integer(0, highest_number) : 0;
+  files.count = json.at("count").integer(1, most_frames);
+  files.bit_depth = json.at("bit_depth").integer(1, 16);
+  const double levels = std::exp2(files.bit_depth);
+  files.black_level = json.at("black_level").number(0, levels);
+  files.saturation = json.at("saturation").number(0, levels);
+  if (!(files.saturation > files.black_level))
+    throw json.at("saturation")
+        .error(fmt::format("expected more than black_level ({}), found {}", files.black_level, files.saturation));
+  return files;
+}
+
+std::vector<SequenceFiles> read_sequences(const JsonReader& json) {
+  std::vector<SequenceFiles> sequences;
+  for (const JsonReader& item : json.items()) {
+    SequenceFiles files = read_sequence(item);
+    for (const SequenceFiles& other : sequences)
+      if (other.camera == files.camera)
+        throw item.at("camera").error(
+            fmt::format("expected another camera: there is a sequence of \"{}\" already", files.camera));
+    if (!sequences.empty() && files.count != sequences[0].count)
+      throw item.at("count").error(
+          fmt::format("expected {} as for \"{}\", found {}: frame i of every camera is exposed at the same instant, "
+                      "and a file that "
+                      "is missing at the end is a dropped frame",
+                      sequences[0].count, sequences[0].camera, files.count));
+    sequences.push_back(std::move(files));
+  }
+  if (sequences.empty()) throw json.error("expected at least one sequence");
+  return sequences;
+}
+
+}  // namespace
+
+std::optional<std::filesystem::path> Capture::scan_path() const {
+  return scan ? std::optional(folder / *scan) : std::nullopt;
+}
+
+std::filesystem::path Capture::frame_path(const SequenceFiles& sequence, int i) const {
+  const auto pattern = parse_pattern(sequence.frames);
+  if (!pattern) throw std::invalid_argument("a sequence's frames need one %d or %06d: " + sequence.frames);
+  return folder / pattern->path(sequence.first + i);
+}
+
+Capture read_capture(const std::filesystem::path& folder_or_file) {
+  const bool is_folder = std::filesystem::is_directory(folder_or_file);
+  const auto file = is_folder ? folder_or_file / "capture.json" : folder_or_file;
+  const JsonReader json = JsonReader::read(file);
+  json.expect_format("pagesweep-capture", 1);
+  Capture capture;
+  capture.folder = file.parent_path();
+  capture.rig = read_path(json.at("rig"));
+  capture.sequences = read_sequences(json.at("sequences"));
+  if (const auto scan = json.find("scan")) capture.scan = read_path(scan->at("image"));
+  if (const auto notes = json.find("notes")) capture.notes = notes->text();
+  return capture;
+}
+
+void write_capture(const Capture& capture) {
+  nlohmann::ordered_json json = {
+      {"format", "pagesweep-capture"}, {"version", 1}, {"rig", capture.rig.generic_string()}};
+  json["sequences"] = nlohmann::ordered_json::array();
+  for (const SequenceFiles& files : capture.sequences) {
+    if (!parse_pattern(files.frames)) throw std::invalid_argument("write_capture: no frame pattern: " + files.frames);
+    json["sequences"].push_back({{"camera", files.camera},
+                                 {"frames", files.frames},
+                                 {"first", files.first},
+                                 {"count", files.count},
+                                 {"bit_depth", files.bit_depth},
+                                 {"black_level", files.black_level},
+                                 {"saturation", files.saturation}});
+  }
+  if (capture.scan) json["scan"] = {{"image", capture.scan->generic_string()}};
+  if (!capture.notes.empty()) json["notes"] = capture.notes;
+  write_json(capture.folder / "capture.json", json);
+}
+
+Rig read_capture_rig(const Capture& capture) { return read_rig(capture.rig_path()); }
+
+}  // namespace pagesweep
