@@ -5,6 +5,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "pagesweep/base/parallel.h"
+
 namespace pagesweep {
 
 int width_of(const GrayImage& image) {
@@ -47,6 +49,22 @@ void Frames::read_row(int y, Image<float>& samples) const {
         },
         frame(i));
   }
+}
+
+Image<float> brightest(const Frames& frames) {
+  Image<float> picture(frames.width(), frames.height());
+  const auto& sequence = frames.sequence();
+  const auto clipped = static_cast<float>(sequence.saturation - sequence.black_level);
+  parallel_rows(frames.height(), [&](int y) {
+    Image<float> samples;
+    frames.read_row(y, samples);
+    const auto out = picture.row(y);
+    for (int i = 0; i < frames.count(); ++i)
+      for (int x = 0; x < frames.width(); ++x)  // a dropped frame's NaN is never the greater one
+        if (const float gray = std::min(samples(x, i), clipped); gray > out[static_cast<std::size_t>(x)])
+          out[static_cast<std::size_t>(x)] = gray;
+  });
+  return picture;
 }
 
 std::vector<Frames> read_all(FrameSource& source, Progress& progress) {

@@ -58,6 +58,10 @@ class Frames {
   std::vector<std::optional<GrayImage>> images_;
 };
 
+/// The brightest gray value of each pixel over all frames, black level removed, clipped ones at saturation: the picture
+/// in which a sweep shows the whole page lit (paper Fig. 4).
+Image<float> brightest(const Frames& frames);
+
 /// Simultaneous frames of all cameras; a camera whose frame was dropped has none.
 struct FrameSet {
   int index = 0;  ///< [frames] time of exposure

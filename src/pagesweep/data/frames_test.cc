@@ -31,6 +31,12 @@ TEST(Frames, RowsComeWithoutBlackLevelAndSayWhatIsNoMeasurement) {
   EXPECT_EQ(frames.dropped(), 1);
 }
 
+TEST(Frames, TheBrightestGrayValueCountsClippedOnesAsSaturation) {
+  const Image<float> picture = brightest(three_frames_with_the_middle_one_dropped());
+  EXPECT_EQ(picture(0, 0), 10);
+  EXPECT_EQ(picture(1, 0), 248);
+}
+
 TEST(Frames, RefuseAFrameThatDoesNotFit) {
   Frames frames({.camera = "cam1", .width = 2, .height = 1, .count = 1});
   EXPECT_THROW(frames.set(0, Image<std::uint8_t>(3, 1)), std::invalid_argument);

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pagesweep/base/progress.h"
+#include "pagesweep/camera/rig.h"
+#include "pagesweep/data/frames.h"
+#include "pagesweep/data/page.h"
+#include "pagesweep/data/page_surface.h"
+#include "pagesweep/data/point_map.h"
+#include "pagesweep/data/time_map.h"
+#include "pagesweep/dewarping/dewarp.h"
+#include "pagesweep/matching/match_epipolar.h"
+#include "pagesweep/surfacing/fit_surface.h"
+#include "pagesweep/timing/estimate_times.h"
+#include "pagesweep/triangulation/triangulate.h"
+
+namespace pagesweep {
+
+/// What tells which pixels of the cameras see the same spot.
+enum class Matcher {
+  time,           ///< equal time values of the moving stripe (paper III.B)
+  sequence,       ///< equal gray value sequences, of any patterns (paper III.A)
+  light_section,  ///< nothing: each camera alone against the light plane of the rig (the paper's [8])
+};
+constexpr auto names_of(Matcher) { return std::array<std::string_view, 3>{"time", "sequence", "light-section"}; }
+
+/// The options of all stations.
+struct ScanOptions {
+  Matcher matcher = Matcher::time;
+  TimingOptions timing;
+  MatchOptions matching;
+  TriangulationOptions triangulation;
+  SurfaceOptions surface;
+  DewarpOptions dewarp;
+
+  /// \see base/options.h
+  template <class Visitor>
+  void describe_measurement(Visitor&& visit) {
+    visit("matcher", matcher, "", "what tells which pixels of the two cameras see the same spot");
+    timing.describe(visit);
+    matching.describe(visit);
+    triangulation.describe(visit);
+  }
+  template <class Visitor>
+  void describe_pages(Visitor&& visit) {
+    surface.describe(visit);
+    dewarp.describe(visit);
+  }
+};
+
+/// What the cameras measured: one entry a camera, in the order of `cameras`.
+struct Measurement {
+  std::vector<Camera> cameras;
+  std::vector<int> dropped_frames;
+  std::optional<Timing> timing;  ///< time maps, stripe profile, sensor noise; none for the sequence matcher
+  std::vector<PointMap> points;
+};
+
+/// A whole scan: the measured points, the surfaces through them and the flat pages.
+struct Scan {
+  Measurement measurement;
+  std::vector<PageSurface> surfaces;  ///< from left to right
+  std::vector<Page> pages;            ///< one a surface
+};
+
+/// The first half of the way: frames to points.
+/// \throws Error  (bad_input) if the rig lacks a camera of the source, or what the matcher needs
+Measurement reconstruct(FrameSource& frames, const Rig& rig, const ScanOptions& options = {},
+                        Progress& progress = no_progress());
+
+/// The second half: points to flat pages.
+/// \throws Error  (bad_input) if the rig has no scanner or the picture is not of its size; (no_result) if no page is found
+Scan flatten(Measurement measurement, const Picture& scan, const Rig& rig, const ScanOptions& options = {},
+             Progress& progress = no_progress());
+
+/// The whole way: frames, time values, correspondences, points, surface, pages.
+Scan scan_page(FrameSource& frames, const Picture& scan, const Rig& rig, const ScanOptions& options = {},
+               Progress& progress = no_progress());
+
+}  // namespace pagesweep
