@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/matching/agreement.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "pagesweep/base/parallel.h"
+
+namespace pagesweep {
+namespace {
+
+/// The pixels around a position and their bilinear weights.
+struct Cell {
+  std::array<int, 4> x, y;
+  std::array<double, 4> weight;
+};
+
+Cell cell_around(double u, double v, int width, int height) {
+  u = std::clamp(u, 0.0, width - 1.0);
+  v = std::clamp(v, 0.0, height - 1.0);
+  const int left = static_cast<int>(u), top = static_cast<int>(v);
+  const int right = std::min(left + 1, width - 1), bottom = std::min(top + 1, height - 1);
+  const double a = u - left, b = v - top;
+  return {{left, right, left, right}, {top, top, bottom, bottom}, {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b}};
+}
+
+/// Whether the match of pixel (x, y) is confirmed from the other side.
+bool is_confirmed(const Correspondences& matches, const Correspondences& back, int x, int y, double max_px) {
+  const double u = matches.u(x, y), v = matches.v(x, y);
+  const Cell cell = cell_around(u, v, back.width(), back.height());
+  double weights = 0, du = 0, dv = 0, sigma = 0;
+  int out_of_view = 0, found = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const int cx = cell.x[i], cy = cell.y[i];
+    const PixelStatus status = back.status(cx, cy);
+    out_of_view += status == PixelStatus::outside_view ? 1 : 0;
+    if (status != PixelStatus::ok) continue;
+    // A step of one picture is about the same step of the other, which serves where corners are missing.
+    const double weight = cell.weight[i] + 1e-6;
+    weights += weight;
+    du += weight * (back.u(cx, cy) + (u - cx) - x);
+    dv += weight * (back.v(cx, cy) + (v - cy) - y);
+    sigma += weight * back.sigma(cx, cy);
+    ++found;
+  }
+  if (found == 0) return out_of_view == 4;
+  // With all four corners the steps cancel; one that is missing leaves up to a pixel of foreshortening in doubt.
+  const double doubt = found == 4 ? 0 : 0.5;
+  const double tolerance = std::max(max_px, 4 * std::hypot(matches.sigma(x, y), sigma / weights)) + doubt;
+  return std::hypot(du, dv) <= tolerance * weights;
+}
+
+void mark(const Correspondences& matches, const Correspondences& back, double max_px, Image<PixelStatus>& status) {
+  status = matches.status;
+  parallel_rows(matches.height(), [&](int y) {
+    for (int x = 0; x < matches.width(); ++x)
+      if (status(x, y) == PixelStatus::ok && !is_confirmed(matches, back, x, y, max_px))
+        status(x, y) = PixelStatus::inconsistent;
+  });
+}
+
+void apply(Image<PixelStatus>& status, Correspondences& matches) {
+  matches.status.swap(status);
+  for (std::size_t i = 0; i < matches.status.size(); ++i) {
+    if (matches.status.data()[i] == PixelStatus::ok) continue;
+    matches.u.data()[i] = matches.v.data()[i] = matches.sigma.data()[i] = not_a_number;
+  }
+}
+
+}  // namespace
+
+void keep_agreeing(MatchPair& pair, double max_px) {
+  Image<PixelStatus> first, second;  // both are judged by what they were
+  mark(pair.from_first, pair.from_second, max_px, first);
+  mark(pair.from_second, pair.from_first, max_px, second);
+  apply(first, pair.from_first);
+  apply(second, pair.from_second);
+}
+
+}  // namespace pagesweep

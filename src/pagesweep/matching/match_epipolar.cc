@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/matching/match_epipolar.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "pagesweep/matching/time_field.h"
+#include "pagesweep/matching/two_way.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double tolerance_px = 1e-4;
+
+/// How far the other camera's time, along one curve, is ahead of one pixel's.
+struct TimeDifference {
+  const TimeField* field;
+  const EpipolarCurve* curve;
+  double time;
+
+  /// [frames] NaN where the other camera has no time, or does not see.
+  double operator()(double w) const {
+    if (!curve->contains(w)) return nan;
+    const auto pixel = curve->at(w);
+    return pixel ? field->time_at(*pixel) - time : nan;
+  }
+};
+
+/// A place where the difference may vanish: its sign changes from `low` to `high`.
+struct Bracket {
+  double low, high;
+  double at_low, at_high;
+};
+
+/// Root within a bracket by regula falsi (Illinois), nothing if it closes around a gap of the time map.
+std::optional<double> solve(const TimeDifference& difference, Bracket b, double step) {
+  for (int i = 0; i < 40; ++i) {
+    const double w = b.low - b.at_low * (b.high - b.low) / (b.at_high - b.at_low);
+    const double value = difference(w);
+    if (std::isnan(value)) return std::nullopt;
+    if (value == 0 || std::abs(b.high - b.low) < tolerance_px * step) return w;
+    if ((value > 0) == (b.at_low > 0)) {
+      if (std::abs(w - b.low) < tolerance_px * step) return w;
+      b.low = w;
+      b.at_low = value;
+      b.at_high /= 2;
+    } else {
+      if (std::abs(w - b.high) < tolerance_px * step) return w;
+      b.high = w;
+      b.at_high = value;
+      b.at_low /= 2;
+    }
+  }
+  return std::nullopt;
+}
+
+/// Root near the left neighbour's depth: steps downhill from there until the sign changes.
+std::optional<double> follow(const TimeDifference& difference, double expected, double step) {
+  constexpr double reach_px = 6;
+  const double here = difference(expected);
+  if (here == 0) return expected;
+  const double ahead = difference(expected + step);
+  const double slope = ahead - here;
+  if (!std::isfinite(slope) || slope == 0) return std::nullopt;
+  const double distance = -here / slope;  // [px] as the neighbourhood predicts
+  if (!(std::abs(distance) < reach_px)) return std::nullopt;
+  if (distance > 0 && distance <= 1) return solve(difference, {expected, expected + step, here, ahead}, step);
+  const double far_end = expected + (distance + std::copysign(0.3, distance)) * step;
+  const double at_far_end = difference(far_end);
+  if (!(here * at_far_end < 0)) return std::nullopt;
+  return solve(difference, {expected, far_end, here, at_far_end}, step);
+}
+
+/// Finds equal times along epipolar curves.
+class TimeMatcher final : public Matcher {
+ public:
+  TimeMatcher(const TimeMap& from, const TimeField& to, const MatchOptions& options)
+      : from_(&from), to_(&to), max_sigma_px_(options.max_sigma_px) {}
+
+  PixelStatus status_of(int x, int y) const override { return from_->status(x, y); }
+
+  Match find(int x, int y, const EpipolarCurve& curve, double expected, CurveSamples& samples) const override {
+    const TimeDifference difference{to_, &curve, from_->time(x, y)};
+    if (curve.contains(expected))
+      if (const auto root = follow(difference, expected, 1 / curve.speed(expected)))
+        return match_at(*root, difference, from_->sigma(x, y));
+    return search(difference, expected, from_->sigma(x, y), samples);
+  }
+
+ private:
+  /// Looks along the whole curve.
+  Match search(const TimeDifference& difference, double expected, float sigma, CurveSamples& samples) const;
+  Match match_at(double root, const TimeDifference& difference, float sigma) const;
+
+  const TimeMap* from_;
+  const TimeField* to_;
+  double max_sigma_px_;
+};
+
+/// Which of several roots belongs to the pixel: the one that continues the left neighbour's surface, if the others are
+/// far from it; nothing if that cannot be told.
+std::optional<double> choose(const std::vector<double>& roots, double expected, double step) {
+  if (roots.size() == 1) return roots[0];
+  double nearest = nan, nearest_px = std::numeric_limits<double>::infinity(), second_px = nearest_px;
+  for (const double root : roots) {
+    const double distance_px = std::abs(root - expected) / step;
+    if (distance_px < nearest_px) {
+      second_px = std::exchange(nearest_px, distance_px);
+      nearest = root;
+    } else if (distance_px < second_px) {
+      second_px = distance_px;
+    }
+  }
+  const bool clear = nearest_px < 4 && second_px > 3 * nearest_px + 4;
+  return clear ? std::optional(nearest) : std::nullopt;
+}
+
+Match TimeMatcher::search(const TimeDifference& difference, double expected, float sigma, CurveSamples& samples) const {
+  sample(*difference.curve, samples);
+  std::vector<double> roots;
+  bool seen = false;
+  double before = nan;
+  for (int i = 0; i < samples.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Eigen::Vector2d pixel(samples.u[k], samples.v[k]);
+    const double value = std::isnan(pixel.x()) ? nan : to_->time_at(pixel) - difference.time;
+    seen = seen || !std::isnan(pixel.x());
+    if (before * value <= 0) {
+      const double low = samples.inverse_depth[k - 1], high = samples.inverse_depth[k];
+      const auto root = solve(difference, {low, high, before, value}, high - low);
+      const bool known = root && !roots.empty() && *root - roots.back() < high - low;
+      if (root && !known) roots.push_back(*root);
+    }
+    before = value;
+  }
+  if (!seen) return Match::none(PixelStatus::outside_view);
+  if (roots.empty()) return Match::none(PixelStatus::no_match);
+  const auto root = choose(roots, expected, 1 / difference.curve->speed(roots[0]));
+  return root ? match_at(*root, difference, sigma) : Match::none(PixelStatus::ambiguous);
+}
+
+Match TimeMatcher::match_at(double root, const TimeDifference& difference, float sigma) const {
+  const EpipolarCurve& curve = *difference.curve;
+  const auto pixel = curve.at(root);
+  if (!pixel) return Match::none(PixelStatus::outside_view);
+  // The slope is taken over two pixels where the map allows it: over less, noise would be taken for slope.
+  const double step = 1 / curve.speed(root);
+  const double here = difference(root), before = difference(root - step), behind = difference(root + step);
+  double slope = 0.5 * (behind - before);
+  if (std::isnan(slope)) slope = std::isnan(behind) ? here - before : behind - here;
+  if (!std::isfinite(slope)) return Match::none(PixelStatus::no_match);
+  const double variance = static_cast<double>(sigma) * sigma + to_->variance_at(*pixel);
+  const double sigma_px = std::sqrt(variance) / std::abs(slope);
+  if (!(sigma_px <= max_sigma_px_)) return Match::none(PixelStatus::ambiguous);
+  return {PixelStatus::ok, *pixel, sigma_px, root};
+}
+
+void require_size(const TimeMap& map, const Camera& camera) {
+  if (map.width() != camera.width || map.height() != camera.height)
+    throw std::invalid_argument("match_times: a time map is not of its camera's size");
+}
+
+}  // namespace
+
+MatchPair match_times(const TimeMap& first, const TimeMap& second, const Camera& first_camera,
+                      const Camera& second_camera, const MatchOptions& options, Progress& progress) {
+  require_size(first, first_camera);
+  require_size(second, second_camera);
+  const TimeField first_field(first), second_field(second);
+  const TimeMatcher from_first(first, second_field, options), from_second(second, first_field, options);
+  return match_both_ways(first_camera, second_camera, from_first, from_second, options, progress);
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "pagesweep/base/image.h"
+#include "pagesweep/data/time_map.h"
+
+namespace pagesweep {
+
+/// A time map that can be asked between its pixels, and knows where it must not be.
+///
+/// Neighbouring pixels are linked if both are valid and no jump lies between them. A jump is a difference that is more
+/// than three times that of the pixel pairs on both sides, beyond six standard deviations: an edge of one surface
+/// before another, where a value between the two would be nobody's.
+class TimeField {
+ public:
+  explicit TimeField(const TimeMap& map);
+
+  /// Time at a position [frames] by bilinear interpolation; NaN where a pixel that takes part is missing or not linked.
+  double time_at(const Eigen::Vector2d& pixel) const;
+  /// Variance [frames^2] of time_at, from the pixels' own sigma. \pre time_at is a number
+  double variance_at(const Eigen::Vector2d& pixel) const;
+
+ private:
+  struct Cell {
+    int x, y;
+    double a, b;
+  };
+  Cell cell_at(const Eigen::Vector2d& pixel) const;
+  bool links(const Cell& cell) const;
+
+  const TimeMap* map_;
+  Image<std::uint8_t> linked_;  ///< bit 0: to the pixel at the right, bit 1: to the pixel below
+};
+
+}  // namespace pagesweep

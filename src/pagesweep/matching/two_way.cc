@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/matching/two_way.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "pagesweep/base/parallel.h"
+#include "pagesweep/matching/agreement.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// One camera's pixels and the other camera's picture.
+struct Direction {
+  const Camera* from;
+  const Camera* to;
+  const RayTable* from_rays;
+  const RayTable* to_rays;
+  const Matcher* matcher;
+
+  EpipolarGeometry geometry(InverseDepthRange range) const { return {*from, *from_rays, *to, *to_rays, range}; }
+};
+
+Match find(const Direction& direction, const EpipolarGeometry& geometry, int x, int y, double expected,
+           CurveSamples& samples) {
+  const PixelStatus status = direction.matcher->status_of(x, y);
+  if (status != PixelStatus::ok) return Match::none(status);
+  const EpipolarCurve curve = geometry.curve(x, y);
+  if (curve.range().empty()) return Match::none(PixelStatus::outside_view);
+  return direction.matcher->find(x, y, curve, expected, samples);
+}
+
+/// What the options allow: from a tenth of the cameras' distance to infinity where they say nothing.
+InverseDepthRange allowed_range(const Camera& first, const Camera& second, const MatchOptions& options) {
+  const double baseline = (first.center() - second.center()).norm();
+  if (!(baseline > 0)) throw std::invalid_argument("matching needs two cameras at different places");
+  if (options.near_mm < 0 || options.far_mm < 0 || (options.far_mm > 0 && !(options.near_mm < options.far_mm)))
+    throw std::invalid_argument("matching: the depth range must have 0 <= near < far");
+  return {options.far_mm > 0 ? 1 / options.far_mm : 0, options.near_mm > 0 ? 1 / options.near_mm : 10 / baseline};
+}
+
+/// Inverse depths of a grid of pixels, kept if the matched pixel's own match leads back.
+std::vector<double> probe_depths(const Direction& there, const Direction& back, InverseDepthRange range) {
+  const EpipolarGeometry geometry = there.geometry(range), return_geometry = back.geometry(range);
+  const int width = there.from->width, height = there.from->height;
+  const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / 20000.0)));
+  std::vector<std::vector<double>> rows(static_cast<std::size_t>((height + stride - 1) / stride));
+  parallel_rows(static_cast<int>(rows.size()), [&](int row) {
+    CurveSamples samples;
+    for (int x = stride / 2; x < width; x += stride) {
+      const int y = std::min(row * stride + stride / 2, height - 1);
+      const Match match = find(there, geometry, x, y, nan, samples);
+      if (match.status != PixelStatus::ok) continue;
+      const int u = std::clamp(static_cast<int>(std::lround(match.pixel.x())), 0, there.to->width - 1);
+      const int v = std::clamp(static_cast<int>(std::lround(match.pixel.y())), 0, there.to->height - 1);
+      const Match returned = find(back, return_geometry, u, v, nan, samples);
+      const bool agrees = returned.status == PixelStatus::ok && (returned.pixel - Eigen::Vector2d(x, y)).norm() < 3;
+      if (agrees) rows[static_cast<std::size_t>(row)].push_back(match.inverse_depth);
+    }
+  });
+  std::vector<double> depths;
+  for (const auto& row : rows) depths.insert(depths.end(), row.begin(), row.end());
+  return depths;
+}
+
+/// The depths that the scene shows: all but a thousandth at either end, and a fifth more. A range that is too wide
+/// costs time and a few more ambiguous pixels; one that is too narrow costs the truth.
+InverseDepthRange narrow(InverseDepthRange allowed, std::vector<double> depths) {
+  constexpr std::size_t enough = 100;
+  if (depths.size() < enough) return allowed;
+  std::sort(depths.begin(), depths.end());
+  const std::size_t tail = depths.size() / 1000;
+  const double far = depths[tail], near = depths[depths.size() - 1 - tail];
+  const double margin = 0.2 * (near - far) + 0.02 * near;
+  return {std::max(allowed.far, far - margin), std::min(allowed.near, near + margin)};
+}
+
+Correspondences match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress) {
+  constexpr int band = 32;  // rows between two reports of progress
+  const EpipolarGeometry geometry = direction.geometry(range);
+  Correspondences matches(direction.from->width, direction.from->height);
+  progress.begin(fmt::format("matching {} with {}", direction.from->name, direction.to->name));
+  for (int top = 0; top < matches.height(); top += band) {
+    parallel_rows(std::min(band, matches.height() - top), [&](int row) {
+      const int y = top + row;
+      CurveSamples samples;
+      double expected = nan;
+      for (int x = 0; x < matches.width(); ++x) {
+        const Match match = find(direction, geometry, x, y, expected, samples);
+        matches.status(x, y) = match.status;
+        if (match.status != PixelStatus::ok) continue;
+        matches.u(x, y) = static_cast<float>(match.pixel.x());
+        matches.v(x, y) = static_cast<float>(match.pixel.y());
+        matches.sigma(x, y) = static_cast<float>(match.sigma_px);
+        expected = match.inverse_depth;
+      }
+    });
+    progress.advance(std::min(1.0, (top + band) / static_cast<double>(matches.height())));
+  }
+  return matches;
+}
+
+}  // namespace
+
+MatchPair match_both_ways(const Camera& first, const Camera& second, const Matcher& from_first,
+                          const Matcher& from_second, const MatchOptions& options, Progress& progress) {
+  const InverseDepthRange allowed = allowed_range(first, second, options);
+  const RayTable first_rays(first), second_rays(second);
+  const Direction there{&first, &second, &first_rays, &second_rays, &from_first};
+  const Direction back{&second, &first, &second_rays, &first_rays, &from_second};
+  InverseDepthRange first_range = allowed, second_range = allowed;
+  if (options.near_mm == 0 || options.far_mm == 0) {
+    first_range = narrow(allowed, probe_depths(there, back, allowed));
+    second_range = narrow(allowed, probe_depths(back, there, allowed));
+  }
+  MatchPair pair{match_one_way(there, first_range, progress), match_one_way(back, second_range, progress)};
+  keep_agreeing(pair, options.max_disagreement_px);
+  return pair;
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+
+#include "pagesweep/matching/epipolar_curve.h"
+#include "pagesweep/matching/match_epipolar.h"
+
+namespace pagesweep {
+
+/// The place in the other camera that belongs to one pixel, or why there is none.
+struct Match {
+  PixelStatus status = PixelStatus::no_match;
+  Eigen::Vector2d pixel;     ///< [px]
+  double sigma_px = 0;       ///< along the curve
+  double inverse_depth = 0;  ///< [1/mm]
+
+  static Match none(PixelStatus why) { return {why, {}, 0, 0}; }
+};
+
+/// Finds matches of one camera's pixels in the other: what the two matchers differ in.
+class Matcher {
+ public:
+  virtual ~Matcher() = default;
+  /// Why the pixel cannot be matched at all; ok if it can.
+  virtual PixelStatus status_of(int x, int y) const = 0;
+  /// \param expected  inverse depth of the pixel's left neighbour; NaN if it has none
+  /// \param samples   scratch memory
+  virtual Match find(int x, int y, const EpipolarCurve& curve, double expected, CurveSamples& samples) const = 0;
+};
+
+/// Matches all pixels both ways, finding the depth ranges first where they are not given, and keeps what agrees.
+MatchPair match_both_ways(const Camera& first, const Camera& second, const Matcher& from_first,
+                          const Matcher& from_second, const MatchOptions& options, Progress& progress);
+
+}  // namespace pagesweep
