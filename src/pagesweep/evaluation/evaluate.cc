@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/evaluation/evaluate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <regex>
+
+#include "pagesweep/base/error.h"
+#include "pagesweep/evaluation/time_bound.h"
+#include "pagesweep/io/capture_file.h"
+#include "pagesweep/io/float_tiff.h"
+#include "pagesweep/io/image_file.h"
+#include "pagesweep/io/ply_file.h"
+#include "pagesweep/io/rig_file.h"
+#include "pagesweep/io/truth_file.h"
+
+namespace pagesweep {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// One camera's part of truth and result.
+struct CameraData {
+  const Camera* camera;
+  TruePoints truth;
+  std::optional<PointMap> points;
+  std::optional<TimeMap> times;
+};
+
+fs::path folder_of(const fs::path& folder_or_file) {
+  const fs::path folder = fs::is_directory(folder_or_file) ? folder_or_file : folder_or_file.parent_path();
+  return (folder.empty() ? fs::path(".") : folder).lexically_normal();
+}
+
+std::optional<Capture> capture_beside(const fs::path& truth) {
+  const fs::path folder = fs::absolute(folder_of(truth) / "..").lexically_normal();
+  if (!fs::exists(folder / "capture.json")) return std::nullopt;
+  return read_capture(folder);
+}
+
+Rig find_rig(const EvaluationOptions& options, const std::optional<Capture>& capture, const fs::path& truth) {
+  if (!options.rig.empty()) return read_rig(options.rig);
+  if (capture) return read_capture_rig(*capture);
+  throw bad_input(truth, "", "there is no capture.json in the folder above it that names the rig; give a rig file");
+}
+
+/// Channels of one size with the picture of the camera.
+std::vector<Image<float>> read_camera_tiff(const fs::path& file, int channels, const Camera& camera) {
+  std::vector<Image<float>> images = read_float_tiff(file, channels);
+  if (images[0].width() != camera.width || images[0].height() != camera.height)
+    throw bad_input(file, "",
+                    fmt::format("expected the size of {}, {} x {}, found {} x {}", camera.name, camera.width,
+                                camera.height, images[0].width(), images[0].height()));
+  return images;
+}
+
+Image<PixelStatus> read_status(const fs::path& file, const Camera& camera) {
+  const GrayImage image = read_gray(file, ImageSize{camera.width, camera.height});
+  const auto* codes = std::get_if<Image<std::uint8_t>>(&image);
+  if (!codes) throw bad_input(file, "", "expected 8 bit, found 16");
+  Image<PixelStatus> status(camera.width, camera.height);
+  for (std::size_t i = 0; i < status.size(); ++i) {
+    if (codes->data()[i] >= status_count)
+      throw bad_input(file, "", fmt::format("expected values below {}, found {}", status_count, codes->data()[i]));
+    status.data()[i] = static_cast<PixelStatus>(codes->data()[i]);
+  }
+  return status;
+}
+
+std::optional<PointMap> read_points(const fs::path& out, const Camera& camera) {
+  const fs::path file = out / (camera.name + "_points.tiff");
+  if (!fs::exists(file)) return std::nullopt;
+  PointMap map(camera.width, camera.height);
+  std::vector<Image<float>> xyz = read_camera_tiff(file, 3, camera);
+  map.x.swap(xyz[0]);
+  map.y.swap(xyz[1]);
+  map.z.swap(xyz[2]);
+  if (const fs::path sigma = out / (camera.name + "_point_sigma.tiff"); fs::exists(sigma))
+    map.sigma.swap(read_camera_tiff(sigma, 1, camera)[0]);
+  if (const fs::path status = out / (camera.name + "_status.png"); fs::exists(status)) {
+    map.status = read_status(status, camera);
+    return map;
+  }
+  for (std::size_t i = 0; i < map.status.size(); ++i)
+    if (std::isfinite(map.z.data()[i])) map.status.data()[i] = PixelStatus::ok;
+  return map;
+}
+
+std::optional<TimeMap> read_times(const fs::path& out, const Camera& camera) {
+  const fs::path file = out / (camera.name + "_times.tiff");
+  if (!fs::exists(file)) return std::nullopt;
+  TimeMap map(camera.width, camera.height);
+  std::vector<Image<float>> channels = read_camera_tiff(file, 4, camera);
+  map.time.swap(channels[0]);
+  map.sigma.swap(channels[1]);
+  map.amplitude.swap(channels[2]);
+  map.residual.swap(channels[3]);
+  for (std::size_t i = 0; i < map.status.size(); ++i)
+    if (std::isfinite(map.time.data()[i])) map.status.data()[i] = PixelStatus::ok;
+  return map;
+}
+
+std::vector<CameraData> read_cameras(const fs::path& out, const Truth& truth, const Rig& rig) {
+  std::vector<CameraData> cameras;
+  for (const Camera& camera : rig.cameras) {
+    if (!fs::exists(truth.camera_points_path(camera.name))) continue;
+    CameraData data{&camera, read_camera_points(truth, camera.name), read_points(out, camera), read_times(out, camera)};
+    if (data.truth.width() != camera.width || data.truth.height() != camera.height)
+      throw bad_input(truth.camera_points_path(camera.name), "", "its size is not the camera's in the rig");
+    cameras.push_back(std::move(data));
+  }
+  return cameras;
+}
+
+void evaluate_points(const fs::path& out, const std::vector<CameraData>& cameras, const EvaluationOptions& options,
+                     Evaluation& evaluation) {
+  std::vector<MeasuredView> views;
+  for (const CameraData& data : cameras)
+    views.push_back({data.camera, data.points ? &*data.points : nullptr, &data.truth});
+  const bool have_maps = std::all_of(views.begin(), views.end(), [](const MeasuredView& view) { return view.points; });
+  if (views.empty()) {
+    evaluation.points_reason = "the truth has the points of no camera of the rig";
+  } else if (have_maps) {
+    evaluation.points = compare_points(views, options.points);
+  } else if (fs::exists(out / "points.ply")) {
+    const PointCloud cloud = read_ply(out / "points.ply");
+    evaluation.points_from_cloud = true;
+    evaluation.points = PointComparison{{}, compare_cloud(cloud.points, cloud.sigma, views), {}};
+  } else {
+    evaluation.points_reason = "the result has neither point maps of all cameras nor points.ply";
+  }
+}
+
+/// The bound, if the truth tells profile and sensor.
+BoundOfAmplitude find_bound(const Truth& truth, const std::optional<Capture>& capture) {
+  if (!truth.sensor || !truth.profile || !(truth.sensor->gain_e_per_gray > 0) || truth.profile->values.size() < 3)
+    return {};
+  double clips_at = std::numeric_limits<double>::infinity();
+  if (capture && !capture->sequences.empty())
+    clips_at = capture->sequences[0].saturation - capture->sequences[0].black_level;
+  return TimeBound(*truth.profile, *truth.sensor, clips_at);
+}
+
+void evaluate_times(const std::vector<CameraData>& cameras, const Rig& rig, const BoundOfAmplitude& bound,
+                    const EvaluationOptions& options, Evaluation& evaluation) {
+  std::vector<TimedView> views;
+  for (const CameraData& data : cameras)
+    if (data.times) views.push_back({&*data.times, &data.truth});
+  if (!rig.light)
+    evaluation.times_reason = "the rig has no model of the light";
+  else if (views.empty())
+    evaluation.times_reason = "the result has no time maps";
+  else
+    evaluation.times = compare_times(views, *rig.light, options.times, bound);
+}
+
+/// Numbers of the pages that a result has.
+std::vector<int> pages_in(const fs::path& out) {
+  static const std::regex pattern("page_([1-9][0-9]{0,3})_scanmap\\.tiff");
+  std::vector<int> pages;
+  for (const auto& entry : fs::directory_iterator(out)) {
+    const std::string name = entry.path().filename().string();
+    if (std::smatch match; std::regex_match(name, match, pattern)) pages.push_back(std::stoi(match[1]));
+  }
+  std::sort(pages.begin(), pages.end());
+  return pages;
+}
+
+/// The resolution that the page's picture states; 0 if it states none.
+double page_scale(const fs::path& out, int index) {
+  for (const char* extension : {".png", ".tiff", ".tif", ".jp2", ".jpg", ".jpeg"})
+    if (const fs::path file = out / fmt::format("page_{}{}", index, extension); fs::exists(file))
+      return read_picture(file).pixels_per_mm;
+  return 0;
+}
+
+PageEvaluation evaluate_page(const fs::path& out, const Truth& truth, const TruthPage& page,
+                             const EvaluationOptions& options) {
+  PageEvaluation evaluation{page.index, {}, {}};
+  const fs::path file = out / fmt::format("page_{}_scanmap.tiff", page.index);
+  const double pixels_per_mm = page_scale(out, page.index);
+  if (!fs::exists(file)) {
+    evaluation.reason = "the result does not have this page";
+  } else if (!(pixels_per_mm > 0)) {
+    evaluation.reason = "there is no picture of this page that states its resolution";
+  } else if (!fs::exists(truth.page_scan_map_path(page.index))) {
+    evaluation.reason = "the truth has no scan map of this page";
+  } else {
+    const ScanMap result_map = read_scan_map(file);
+    const ScanMap true_map = read_page_scan_map(truth, page.index);
+    evaluation.errors = compare_pages({&result_map, pixels_per_mm}, {&true_map, page.pixels_per_mm}, options.pages);
+    if (evaluation.errors->displacement.count == 0) {
+      evaluation.errors.reset();
+      evaluation.reason = "the result shows nothing of this page";
+    }
+  }
+  return evaluation;
+}
+
+}  // namespace
+
+Evaluation evaluate(const fs::path& out, const fs::path& truth_folder, const EvaluationOptions& options,
+                    Progress& progress) {
+  if (!fs::is_directory(out)) throw cannot_read(out, "there is no such folder");
+  const Truth truth = read_truth(truth_folder);
+  const std::optional<Capture> capture = capture_beside(truth_folder);
+  const Rig rig = find_rig(options, capture, truth_folder);
+  Evaluation evaluation;
+  progress.begin("reading points and times");
+  const std::vector<CameraData> cameras = read_cameras(out, truth, rig);
+  for (const CameraData& data : cameras) evaluation.cameras.push_back(data.camera->name);
+  progress.begin("points against the true surface");
+  evaluate_points(out, cameras, options, evaluation);
+  progress.begin("time values against the light's middle");
+  evaluate_times(cameras, rig, find_bound(truth, capture), options, evaluation);
+  progress.begin("pages against the printed ones");
+  for (const TruthPage& page : truth.pages) {
+    evaluation.pages.push_back(evaluate_page(out, truth, page, options));
+    progress.advance(static_cast<double>(evaluation.pages.size()) / static_cast<double>(truth.pages.size()));
+  }
+  for (const int index : pages_in(out))
+    if (std::none_of(truth.pages.begin(), truth.pages.end(), [&](const TruthPage& p) { return p.index == index; }))
+      evaluation.unexpected_pages.push_back(index);
+  return evaluation;
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/evaluation/local_fit.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "pagesweep/evaluation/statistics.h"
+
+namespace pagesweep {
+namespace {
+
+/// A measured point in the frame of the central pixel's ray, lengths over the neighbourhood's radius.
+struct Sample {
+  double a, b;    ///< across the ray
+  double height;  ///< along it, towards the camera [mm]
+  double weight;  ///< 1 / sigma^2, up to a factor
+};
+
+using Terms = Eigen::Matrix<double, 6, 1>;
+
+Terms terms_at(const Sample& sample) {
+  Terms terms;
+  terms << 1, sample.a, sample.b, sample.a * sample.a, sample.a * sample.b, sample.b * sample.b;
+  return terms;
+}
+
+std::vector<Sample> gather(const PointMap& points, int x, int y, const Eigen::Vector3d& center, double radius_mm) {
+  const auto point_at = [&](int i, int j) -> Eigen::Vector3d {
+    return Eigen::Vector3f(points.x(i, j), points.y(i, j), points.z(i, j)).cast<double>();
+  };
+  const Eigen::Vector3d origin = point_at(x, y);
+  const Eigen::Vector3d to_camera = (center - origin).normalized();
+  const Eigen::Vector3d across_a = to_camera.unitOrthogonal();
+  const Eigen::Vector3d across_b = to_camera.cross(across_a);
+  std::vector<Sample> samples;
+  // Rings of pixels around the centre, until one lies outside the neighbourhood as a whole.
+  bool ring_reaches_in = true;
+  for (int ring = 0; ring_reaches_in; ++ring) {
+    ring_reaches_in = ring == 0;
+    for (int j = y - ring; j <= y + ring; ++j)
+      for (int i = x - ring; i <= x + ring; i += std::abs(j - y) == ring ? 1 : std::max(1, 2 * ring)) {
+        if (i < 0 || j < 0 || i >= points.width() || j >= points.height()) continue;
+        if (points.status(i, j) != PixelStatus::ok) {
+          ring_reaches_in |= ring < 3;
+          continue;
+        }
+        const Eigen::Vector3d offset = point_at(i, j) - origin;
+        const double a = offset.dot(across_a) / radius_mm, b = offset.dot(across_b) / radius_mm;
+        if (!(a * a + b * b <= 1)) continue;
+        ring_reaches_in = true;
+        const double sigma = points.sigma(i, j);
+        samples.push_back({a, b, offset.dot(to_camera), sigma > 0 ? 1 / (sigma * sigma) : 0});
+      }
+  }
+  if (std::all_of(samples.begin(), samples.end(), [](const Sample& s) { return s.weight == 0; }))
+    for (Sample& sample : samples) sample.weight = 1;
+  return samples;
+}
+
+/// Whether the centre is inside the samples rather than at their rim, where a fit extrapolates.
+bool surround_the_centre(const std::vector<Sample>& samples) {
+  double a = 0, b = 0;
+  for (const Sample& sample : samples) {
+    a += sample.a;
+    b += sample.b;
+  }
+  constexpr double most = 0.2;  // of the radius; half a disk has its centre of mass at 0.42
+  return std::hypot(a, b) < most * static_cast<double>(samples.size());
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> fit_locally(const PointMap& points, int x, int y, const Eigen::Vector3d& camera_center,
+                                           double diameter_mm, LocalFit model) {
+  std::vector<Sample> samples = gather(points, x, y, camera_center, diameter_mm / 2);
+  const Eigen::Index unknowns = model == LocalFit::plane ? 3 : 6;
+  if (samples.size() < 2 * static_cast<std::size_t>(unknowns) || !surround_the_centre(samples)) return std::nullopt;
+  std::vector<double> robust(samples.size(), 1), sizes(samples.size());
+  double height = 0;
+  for (int round = 0; round < 4; ++round) {
+    Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+    Terms right = Terms::Zero();
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const Terms terms = terms_at(samples[i]);
+      const double weight = robust[i] * samples[i].weight;
+      normal += weight * terms * terms.transpose();
+      right += weight * samples[i].height * terms;
+    }
+    const Eigen::LDLT<Eigen::MatrixXd> factors(normal.topLeftCorner(unknowns, unknowns));
+    if (factors.info() != Eigen::Success || !(factors.rcond() > 1e-9)) return std::nullopt;
+    const Eigen::VectorXd solution = factors.solve(right.head(unknowns));
+    height = solution[0];
+    for (std::size_t i = 0; i < samples.size(); ++i)
+      sizes[i] = std::abs(samples[i].height - terms_at(samples[i]).head(unknowns).dot(solution));
+    const double limit = 4.685 * 1.4826 * median_of(sizes);  // Tukey's 95 % efficiency at a Gaussian
+    if (!(limit > 0)) break;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const double r = sizes[i] / limit;
+      robust[i] = r < 1 ? (1 - r * r) * (1 - r * r) : 0;
+    }
+  }
+  const Eigen::Vector3d own(points.x(x, y), points.y(x, y), points.z(x, y));
+  return own + height * (camera_center - own).normalized();
+}
+
+}  // namespace pagesweep

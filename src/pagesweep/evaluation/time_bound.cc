@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/evaluation/time_bound.h"
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace pagesweep {
+namespace {
+
+// The table's amplitudes: 0.5 * 2^(k / 8) gray values, up to 2^17.
+constexpr double first_amplitude = 0.5;
+constexpr double steps_an_octave = 8;
+constexpr int table_size = 145;
+constexpr int phases = 8;
+
+}  // namespace
+
+TimeBound::TimeBound(const TruthProfile& profile, const TruthSensor& sensor, double clips_at_gray)
+    : profile_(profile), sensor_(sensor), clips_at_gray_(clips_at_gray) {
+  if (profile.values.size() < 3 || !(profile.step_frames > 0) || !(sensor.gain_e_per_gray > 0))
+    throw std::invalid_argument("TimeBound: the profile needs three samples and a step, the sensor a gain");
+  for (int k = 0; k < table_size; ++k) {
+    const double amplitude = first_amplitude * std::exp2(k / steps_an_octave);
+    double sum = 0;
+    for (int phase = 0; phase < phases; ++phase) sum += variance(amplitude, (phase + 0.5) / phases);
+    table_.push_back(std::sqrt(sum / phases));
+  }
+}
+
+double TimeBound::light_at(double frames) const {
+  const double position = (frames - profile_.start_frames) / profile_.step_frames;
+  const auto last = static_cast<double>(profile_.values.size() - 1);
+  if (!(position >= 0 && position <= last)) return 0;
+  const auto below = std::min(static_cast<std::size_t>(position), profile_.values.size() - 2);
+  const double share = position - static_cast<double>(below);
+  return (1 - share) * profile_.values[below] + share * profile_.values[below + 1];
+}
+
+double TimeBound::variance(double amplitude_gray, double phase_frames) const {
+  const double end = profile_.start_frames + profile_.step_frames * static_cast<double>(profile_.values.size() - 1);
+  // Half a step to both sides: the slope of the piecewise linear profile, averaged over its corners.
+  const double h = 0.5 * profile_.step_frames;
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  for (int i = static_cast<int>(std::floor(profile_.start_frames)) - 1; i <= end + 1; ++i) {
+    const double since_middle = i - phase_frames;
+    const double gray = amplitude_gray * light_at(since_middle);
+    if (gray >= clips_at_gray_) continue;
+    const double slope = (light_at(since_middle + h) - light_at(since_middle - h)) / (2 * h);
+    const Eigen::Vector3d gradient(-amplitude_gray * slope, light_at(since_middle), 1);  // by t, A, b
+    const double noise = gray / sensor_.gain_e_per_gray + std::pow(sensor_.read_noise_gray, 2) + 1.0 / 12;
+    information += gradient * gradient.transpose() / noise;
+  }
+  const Eigen::FullPivLU<Eigen::Matrix3d> factors(information);
+  return factors.isInvertible() ? factors.inverse()(0, 0) : std::numeric_limits<double>::infinity();
+}
+
+double TimeBound::operator()(double amplitude_gray) const {
+  if (!(amplitude_gray > 0)) return std::numeric_limits<double>::quiet_NaN();
+  const double position =
+      std::clamp(std::log2(amplitude_gray / first_amplitude) * steps_an_octave, 0.0, table_size - 1.0);
+  const auto below = std::min(static_cast<std::size_t>(position), table_.size() - 2);
+  const double share = position - static_cast<double>(below);
+  return (1 - share) * table_[below] + share * table_[below + 1];
+}
+
+}  // namespace pagesweep
