@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/bell_fit.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace pagesweep {
+namespace {
+
+/// phi(z) / Phi(z) of the standard normal distribution.
+double inverse_mills_ratio(double z) {
+  if (z < -8) return -z - 1 / z;  // asymptotic, 2 % off at -8 where no sample of a sound fit is
+  return std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi) / (0.5 * std::erfc(-z / std::numbers::sqrt2));
+}
+
+/// Weight of a residual that is `normalised` standard deviations large: 1 for small ones, 0 from 6 on.
+double biweight(double normalised) {
+  const double u = normalised / 6;
+  return std::abs(u) < 1 ? (1 - u * u) * (1 - u * u) : 0;
+}
+
+/// Sums over all samples for one Gauss-Newton step in N unknowns.
+template <int N>
+struct Step {
+  Eigen::Matrix<double, N, N> information = Eigen::Matrix<double, N, N>::Zero();
+  Eigen::Matrix<double, N, 1> gradient = Eigen::Matrix<double, N, 1>::Zero();
+  double chi_square = 0;
+  int samples = 0;
+
+  void add(const double (&j)[N], double weight, double pull) {
+    for (int r = 0; r < N; ++r) {
+      gradient(r) += pull * j[r];
+      for (int c = 0; c <= r; ++c) information(r, c) += weight * j[r] * j[c];
+    }
+  }
+};
+
+template <int N>
+class Fitter {
+ public:
+  Fitter(std::span<const float> gray, int first_frame, const StripeProfile& profile, const SensorNoise& noise,
+         const Bell& start, const BellFitOptions& options)
+      : gray_(gray), first_frame_(first_frame), profile_(profile), noise_(noise), start_(start), options_(options) {}
+
+  BellFit run() {
+    BellFit fit;
+    fit.bell = start_;
+    const double longest_step = 0.3 * profile_.full_width_half_maximum() * start_.width;
+    for (int iteration = 0; iteration < options_.most_iterations && !fit.converged; ++iteration) {
+      const Step<N> step = sum(fit.bell);
+      const Eigen::LDLT<Eigen::Matrix<double, N, N>, Eigen::Lower> solver(step.information);
+      const Eigen::Matrix<double, N, 1> change = solver.solve(step.gradient);
+      if (!change.allFinite()) return fit;
+      const double sigma = move(fit, change, longest_step, solver);
+      // The error that a last step of this size leaves is of second order: far below a hundredth of sigma.
+      fit.converged = iteration > 0 && std::abs(change(2)) < std::max(0.03 * sigma, 1e-7) &&
+                      std::abs(change(0)) <= 0.01 * fit.bell.amplitude;
+      fit.chi_square = step.chi_square;
+      fit.samples = step.samples;
+    }
+    return fit;
+  }
+
+ private:
+  Step<N> sum(const Bell& bell) const {
+    Step<N> step;
+    const double per_width = 1 / bell.width;
+    for (std::size_t k = 0; k < gray_.size(); ++k) {
+      const double gray = gray_[k];
+      if (std::isnan(gray)) continue;
+      const double t = (first_frame_ + static_cast<double>(k) - bell.time) * per_width;
+      const auto [value, slope] = profile_.at(t);
+      const double model = bell.amplitude * value + bell.background;
+      double j[N];
+      j[0] = value;
+      j[1] = 1;
+      j[2] = -bell.amplitude * slope * per_width;
+      if constexpr (N == 4) j[3] = -bell.amplitude * slope * t;
+      const double precision = 1 / noise_.variance(model);
+      if (std::isinf(gray))
+        add_clipped(step, j, model, precision);
+      else
+        add_measured(step, j, gray - model, precision, bell.amplitude);
+    }
+    if constexpr (N == 4) {
+      const double prior = 1 / (options_.log_width_sigma * options_.log_width_sigma);
+      step.information(3, 3) += prior;
+      step.gradient(3) -= prior * std::log(bell.width / start_.width);
+    }
+    return step;
+  }
+
+  void add_measured(Step<N>& step, const double (&j)[N], double residual, double precision, double amplitude) const {
+    double weight = precision;
+    if (options_.robust) {
+      // A model can be no better than a hundredth or two of the amplitude: less is no reason for distrust.
+      const double tolerance = 0.015 * amplitude;
+      weight *= biweight(residual / std::sqrt(1 / precision + tolerance * tolerance));
+    }
+    step.add(j, weight, weight * residual);
+    step.chi_square += weight * residual * residual;
+    ++step.samples;
+  }
+
+  void add_clipped(Step<N>& step, const double (&j)[N], double model, double precision) const {
+    const double root = std::sqrt(precision);
+    const double z = (model - noise_.ceiling) * root;
+    if (z > 5) return;  // it had to be clipped and tells nothing
+    const double ratio = inverse_mills_ratio(z);
+    step.add(j, ratio * (ratio + z) * precision, ratio * root);
+  }
+
+  /// Applies a step, held within its limits, and sets the covariance. \return standard deviation of the time
+  double move(BellFit& fit, const Eigen::Matrix<double, N, 1>& change, double longest_step,
+              const Eigen::LDLT<Eigen::Matrix<double, N, N>, Eigen::Lower>& solver) const {
+    Bell& bell = fit.bell;
+    bell.amplitude = std::max(bell.amplitude + change(0), 0.3 * bell.amplitude);
+    bell.background += change(1);
+    bell.time += std::clamp(change(2), -longest_step, longest_step);
+    if constexpr (N == 4) bell.width *= std::exp(std::clamp(change(3), -0.3, 0.3));
+    const Eigen::Matrix<double, N, N> covariance = solver.solve(Eigen::Matrix<double, N, N>::Identity());
+    fit.covariance.template topLeftCorner<N, N>() = covariance;
+    return std::sqrt(std::max(0.0, covariance(2, 2)));
+  }
+
+  std::span<const float> gray_;
+  int first_frame_;
+  const StripeProfile& profile_;
+  const SensorNoise& noise_;
+  const Bell start_;
+  const BellFitOptions& options_;
+};
+
+}  // namespace
+
+double BellFit::time_sigma() const { return std::sqrt(covariance(2, 2)); }
+
+double BellFit::reduced_chi_square() const {
+  const int unknowns = covariance(3, 3) > 0 ? 4 : 3;
+  return chi_square / std::max(1, samples - unknowns);
+}
+
+BellFit fit_bell(std::span<const float> gray, int first_frame, const StripeProfile& profile, const SensorNoise& noise,
+                 const Bell& start, const BellFitOptions& options) {
+  if (options.fit_width) return Fitter<4>(gray, first_frame, profile, noise, start, options).run();
+  return Fitter<3>(gray, first_frame, profile, noise, start, options).run();
+}
+
+Eigen::Vector4d bell_gradient(const Bell& bell, const StripeProfile& profile, double time) {
+  const double t = (time - bell.time) / bell.width;
+  const auto [value, slope] = profile.at(t);
+  return {value, 1, -bell.amplitude * slope / bell.width, -bell.amplitude * slope * t};
+}
+
+}  // namespace pagesweep

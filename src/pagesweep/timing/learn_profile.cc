@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/learn_profile.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "pagesweep/base/error.h"
+#include "pagesweep/base/parallel.h"
+#include "pagesweep/timing/bell_fit.h"
+
+namespace pagesweep {
+namespace {
+
+/// A gray value sequence that may teach the profile.
+struct Pupil {
+  std::size_t camera = 0;
+  std::vector<float> gray;
+  int first_frame = 0;  ///< of gray, after it was cut to the stripe's surroundings
+  int clipped = 0;      ///< samples
+  double middle = 0;    ///< [frames] between the crossings of half height
+  double fwhm = 0;      ///< [frames]
+  Bell bell;
+  std::uint64_t rank = 0;  ///< random, fixed by the pixel's place
+};
+
+constexpr int rows_looked_at = 96, columns_looked_at = 512;  // of each camera: enough pixels for any subset
+
+std::uint64_t mix(std::uint64_t z) {  // splitmix64's finaliser
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
+  return z ^ (z >> 31);
+}
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double ceiling_of(const Frames& frames) {
+  // A gray value stands for all light that rounds to it.
+  return frames.sequence().saturation - frames.sequence().black_level - 0.5;
+}
+
+/// Where the sequence crosses a level, walking from `from` in steps of `direction`; NaN if it never does.
+double crossing(std::span<const float> gray, int from, int direction, float level) {
+  float before = std::numeric_limits<float>::quiet_NaN();
+  for (int i = from; i >= 0 && i < static_cast<int>(gray.size()); i += direction) {
+    const float here = gray[static_cast<std::size_t>(i)];
+    if (std::isnan(here)) continue;
+    if (here <= level) {
+      const double share = std::isfinite(before) ? (level - here) / (before - here) : 0.5;
+      return i - direction * share;
+    }
+    before = here;
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Fills in what can be seen without a profile. \return whether a complete bell clearly above the noise is there
+bool examine(Pupil& pupil, double ceiling) {
+  std::vector<double> present, changes;
+  int peak = -1;
+  for (int i = 0; i < static_cast<int>(pupil.gray.size()); ++i) {
+    const float gray = pupil.gray[static_cast<std::size_t>(i)];
+    if (std::isnan(gray)) continue;
+    const double seen = std::min(static_cast<double>(gray), ceiling);
+    pupil.clipped += std::isinf(gray);
+    if (!present.empty()) changes.push_back(std::abs(seen - present.back()));
+    present.push_back(seen);
+    if (peak < 0 || gray > pupil.gray[static_cast<std::size_t>(peak)]) peak = i;
+  }
+  if (present.size() < 8) return false;
+  const double high = std::min(static_cast<double>(pupil.gray[static_cast<std::size_t>(peak)]), ceiling);
+  // The stripe passes quickly: the lower half of the samples is background, whatever the drift.
+  const auto quarter = present.begin() + static_cast<std::ptrdiff_t>(present.size() / 4);
+  std::nth_element(present.begin(), quarter, present.end());
+  pupil.bell.background = *quarter;
+  pupil.bell.amplitude = high - pupil.bell.background;
+  const double noise = std::max(median(changes), 0.5);
+  if (pupil.bell.amplitude < 10 * noise) return false;
+  const auto half = static_cast<float>(pupil.bell.background + 0.5 * pupil.bell.amplitude);
+  const double rise = crossing(pupil.gray, peak, -1, half), fall = crossing(pupil.gray, peak, 1, half);
+  pupil.middle = 0.5 * (rise + fall);
+  pupil.fwhm = fall - rise;
+  return std::isfinite(pupil.middle) && pupil.fwhm >= 1;
+}
+
+/// All pixels of a sparse grid over one camera that show a bell.
+std::vector<Pupil> find_pupils(const Frames& frames, std::size_t camera) {
+  const int row_step = std::max(1, frames.height() / rows_looked_at);
+  const int column_step = std::max(1, frames.width() / columns_looked_at);
+  const int rows = (frames.height() + row_step - 1) / row_step;
+  std::vector<std::vector<Pupil>> found(static_cast<std::size_t>(rows));
+  parallel_rows(rows, [&](int r) {
+    Image<float> samples;
+    frames.read_row(r * row_step, samples);
+    for (int x = 0; x < frames.width(); x += column_step) {
+      Pupil pupil;
+      pupil.camera = camera;
+      for (int i = 0; i < frames.count(); ++i) pupil.gray.push_back(samples(x, i));
+      pupil.rank = mix((static_cast<std::uint64_t>(r * row_step) << 32) + static_cast<std::uint64_t>(x) +
+                       0x9E3779B97F4A7C15ULL * (camera + 1));
+      if (examine(pupil, ceiling_of(frames))) found[static_cast<std::size_t>(r)].push_back(std::move(pupil));
+    }
+  });
+  std::vector<Pupil> pupils;
+  for (auto& row : found) std::ranges::move(row, std::back_inserter(pupils));
+  return pupils;
+}
+
+/// Median width at half height of the pixels in use.
+double typical_width(const std::vector<Pupil>& pupils) {
+  std::vector<double> widths;
+  for (const Pupil& pupil : pupils) widths.push_back(pupil.fwhm);
+  return median(widths);
+}
+
+/// Keeps the best teachers of one camera: unclipped if there are enough, bright, of usual width, wholly recorded.
+std::vector<Pupil> select(std::vector<Pupil> pupils, std::size_t most, int frame_count) {
+  constexpr std::size_t enough = 60;
+  const auto unclipped = std::ranges::count_if(pupils, [](const Pupil& p) { return p.clipped == 0; });
+  if (static_cast<std::size_t>(unclipped) >= std::min(enough, std::max<std::size_t>(1, pupils.size() / 4)))
+    std::erase_if(pupils, [](const Pupil& p) { return p.clipped > 0; });
+  if (pupils.empty()) return pupils;
+  std::vector<double> amplitudes;
+  for (const Pupil& pupil : pupils) amplitudes.push_back(pupil.bell.amplitude);
+  const auto high = amplitudes.begin() + static_cast<std::ptrdiff_t>(amplitudes.size() * 19 / 20);
+  std::nth_element(amplitudes.begin(), high, amplitudes.end());
+  std::erase_if(pupils, [bright = 0.5 * *high](const Pupil& p) { return p.bell.amplitude < bright; });
+  const double width = typical_width(pupils);
+  std::erase_if(pupils, [&](const Pupil& p) {
+    const double margin = 1.5 * width;
+    return std::abs(p.fwhm - width) > 0.35 * width || p.middle < margin || p.middle > frame_count - 1 - margin;
+  });
+  std::ranges::sort(pupils, {}, &Pupil::rank);
+  if (pupils.size() > most) pupils.resize(most);
+  return pupils;
+}
+
+/// Cuts a sequence to what surrounds the stripe.
+void cut(Pupil& pupil, double reach) {
+  const int count = static_cast<int>(pupil.gray.size());
+  const int begin = std::clamp(static_cast<int>(std::floor(pupil.middle - reach)), 0, count);
+  const int end = std::clamp(static_cast<int>(std::ceil(pupil.middle + reach)) + 1, begin, count);
+  pupil.gray = {pupil.gray.begin() + begin, pupil.gray.begin() + end};
+  pupil.first_frame = begin;
+}
+
+/// Something bell-like to align with for the first time: a raised cosine.
+StripeProfile raised_cosine(double fwhm) {
+  std::vector<StripeProfile::Point> points;
+  for (double t = -2 * fwhm; t <= 2 * fwhm; t += fwhm / 50)
+    points.push_back({t, std::abs(t) < fwhm ? 0.5 + 0.5 * std::cos(3.14159265358979 * t / fwhm) : 0});
+  return StripeProfile::fit(points, -1.5 * fwhm, 1.5 * fwhm, fwhm / 8);
+}
+
+class Teacher {
+ public:
+  Teacher(std::vector<Pupil> pupils, std::vector<SensorNoise> noise) : pupils_(std::move(pupils)) {
+    learned_.noise = std::move(noise);
+    fwhm_ = typical_width(pupils_);
+    reach_ = 2.5 * fwhm_;
+    learned_.profile = raised_cosine(fwhm_);
+    only_flanks_ = std::ranges::all_of(pupils_, [](const Pupil& p) { return p.clipped > 0; });
+    for (Pupil& pupil : pupils_) {
+      cut(pupil, 1.2 * reach_);
+      pupil.bell.time = pupil.middle;
+    }
+  }
+
+  LearnedStripe run() {
+    const int iterations = only_flanks_ ? 8 : 5;
+    for (int iteration = 0; iteration < iterations; ++iteration) {
+      align(iteration);
+      average(iteration + 2 >= iterations);
+      if (iteration > 0) learn_noise();
+    }
+    return std::move(learned_);
+  }
+
+ private:
+  void align(int iteration) {
+    fits_.resize(pupils_.size());
+    // The first profile is wrong: neither widths nor outliers can be told with it.
+    const BellFitOptions options{.fit_width = iteration > 0 && !only_flanks_,
+                                 .log_width_sigma = 0.1,
+                                 .robust = iteration > 1,
+                                 .most_iterations = 20};
+    parallel_ranges(static_cast<int>(pupils_.size()), 64, [&](int begin, int end) {
+      for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
+        Bell start = iteration == 0 ? pupils_[i].bell : fits_[i].bell;
+        start.width = 1;
+        fits_[i] = fit_bell(pupils_[i].gray, pupils_[i].first_frame, learned_.profile,
+                            learned_.noise[pupils_[i].camera], start, options);
+      }
+    });
+    centre_widths();
+  }
+
+  /// Widths are relative to the median one.
+  void centre_widths() {
+    std::vector<double> widths;
+    for (const BellFit& fit : fits_)
+      if (fit.converged) widths.push_back(fit.bell.width);
+    if (widths.empty())
+      throw no_result("the stripe's profile could not be learned: no gray value sequence fits another");
+    const double middle = median(widths);
+    for (BellFit& fit : fits_) fit.bell.width /= middle;
+  }
+
+  /// The samples of all well fitted pixels in common time and height, robustly averaged, become the next profile.
+  void average(bool final_support) {
+    const double spacing = std::clamp(fwhm_ / 14, 0.2, 0.5);
+    const double begin = final_support ? support_begin() : -reach_;
+    const double end = final_support ? support_end() : reach_;
+    const double bin_length = spacing / 4;
+    std::vector<std::vector<StripeProfile::Point>> bins(
+        static_cast<std::size_t>(std::ceil((end - begin) / bin_length)));
+    const double limit = usual_misfit() * 2;
+    for (std::size_t i = 0; i < pupils_.size(); ++i) {
+      if (!fits_[i].converged || misfit(fits_[i]) > limit) continue;
+      scatter(pupils_[i], fits_[i].bell, begin, bin_length, bins);
+    }
+    std::vector<StripeProfile::Point> points;
+    for (auto& bin : bins)
+      if (!bin.empty()) points.push_back(robust_mean(bin));
+    if (!final_support) remove_baseline(points);
+    learned_.profile = StripeProfile::fit(points, begin, end, spacing);
+  }
+
+  /// What is left where no stripe is any more would otherwise be learned as part of it, as the fits' background allows.
+  void remove_baseline(std::vector<StripeProfile::Point>& points) const {
+    double weight = 0, sum = 0;
+    const double before = points.front().time, after = points.back().time, outer = 0.15 * fwhm_;
+    for (const auto& point : points)
+      if (point.time < before + outer || point.time > after - outer) {
+        weight += point.weight;
+        sum += point.weight * point.value;
+      }
+    for (auto& point : points) point.value -= sum / weight;
+  }
+
+  static double misfit(const BellFit& fit) { return std::sqrt(fit.reduced_chi_square()); }
+  double usual_misfit() const {
+    std::vector<double> misfits;
+    for (const BellFit& fit : fits_)
+      if (fit.converged) misfits.push_back(misfit(fit));
+    return median(misfits);
+  }
+
+  void scatter(const Pupil& pupil, const Bell& bell, double begin, double bin_length,
+               std::vector<std::vector<StripeProfile::Point>>& bins) const {
+    const SensorNoise& noise = learned_.noise[pupil.camera];
+    for (std::size_t k = 0; k < pupil.gray.size(); ++k) {
+      const double gray = pupil.gray[k];
+      // Close below the ceiling only those samples are unclipped whose noise is negative.
+      if (!std::isfinite(gray) || gray > noise.ceiling - 3 * std::sqrt(noise.variance(gray))) continue;
+      const double time = (pupil.first_frame + static_cast<double>(k) - bell.time) / bell.width;
+      const double bin = (time - begin) / bin_length;
+      if (bin < 0 || bin >= static_cast<double>(bins.size())) continue;
+      const double weight = bell.amplitude * bell.amplitude / noise.variance(gray);
+      bins[static_cast<std::size_t>(bin)].push_back({time, (gray - bell.background) / bell.amplitude, weight});
+    }
+  }
+
+  /// Mean of what is near the median: humps and glints of single pixels stay out.
+  static StripeProfile::Point robust_mean(std::vector<StripeProfile::Point>& bin) {
+    std::vector<double> values, deviations;
+    for (const auto& point : bin) values.push_back(point.value);
+    const double middle = median(values);
+    for (const auto& point : bin) deviations.push_back(std::abs(point.value - middle));
+    const double limit = 3 * 1.4826 * median(deviations) + 1e-6;
+    StripeProfile::Point mean{0, 0, 0};
+    for (const auto& point : bin) {
+      if (std::abs(point.value - middle) > limit) continue;
+      mean.time += point.weight * point.time;
+      mean.value += point.weight * point.value;
+      mean.weight += point.weight;
+    }
+    mean.time /= mean.weight;
+    mean.value /= mean.weight;
+    return mean;
+  }
+
+  /// The support ends where nothing clearly above 0 is left, with a knot or two to fall to 0 smoothly.
+  double support_begin() const {
+    double t = learned_.profile.begin();
+    while (t < -0.8 * fwhm_ && std::abs(learned_.profile.value(t)) < negligible) t += 0.02 * fwhm_;
+    return std::max(learned_.profile.begin(), t - 0.15 * fwhm_);
+  }
+  double support_end() const {
+    double t = learned_.profile.end();
+    while (t > 0.8 * fwhm_ && std::abs(learned_.profile.value(t)) < negligible) t -= 0.02 * fwhm_;
+    return std::min(learned_.profile.end(), t + 0.15 * fwhm_);
+  }
+
+  void learn_noise() {
+    for (std::size_t camera = 0; camera < learned_.noise.size(); ++camera) {
+      std::vector<NoiseSample> samples;
+      const double limit = usual_misfit() * 2;
+      for (std::size_t i = 0; i < pupils_.size(); ++i)
+        if (pupils_[i].camera == camera && fits_[i].converged && misfit(fits_[i]) <= limit)
+          collect_noise(pupils_[i], fits_[i], samples);
+      if (samples.empty()) continue;
+      const double ceiling = learned_.noise[camera].ceiling;
+      learned_.noise[camera] = fit_sensor_noise(samples);
+      learned_.noise[camera].ceiling = ceiling;
+    }
+  }
+
+  void collect_noise(const Pupil& pupil, const BellFit& fit, std::vector<NoiseSample>& samples) const {
+    const SensorNoise& noise = learned_.noise[pupil.camera];
+    for (std::size_t k = 0; k < pupil.gray.size(); ++k) {
+      if (!std::isfinite(pupil.gray[k])) continue;
+      const double time = pupil.first_frame + static_cast<double>(k);
+      const Eigen::Vector4d gradient = bell_gradient(fit.bell, learned_.profile, time);
+      const double model = fit.bell.amplitude * gradient(0) + fit.bell.background;
+      if (model > noise.ceiling - 3 * std::sqrt(noise.variance(model))) continue;
+      const double leverage = gradient.dot(fit.covariance * gradient) / noise.variance(model);
+      const double residual = pupil.gray[k] - model;
+      samples.push_back({model, residual * residual / std::max(0.2, 1 - leverage)});
+    }
+  }
+
+  static constexpr double negligible = 0.003;
+
+  std::vector<Pupil> pupils_;
+  std::vector<BellFit> fits_;
+  LearnedStripe learned_;
+  double fwhm_ = 0;   ///< [frames]
+  double reach_ = 0;  ///< [frames] before and after the middle within which the profile is looked for
+  bool only_flanks_ = false;
+};
+
+}  // namespace
+
+LearnedStripe learn_stripe(std::span<const Frames> cameras, int most_pixels) {
+  std::vector<Pupil> pupils;
+  std::vector<SensorNoise> noise(cameras.size());
+  const auto share = static_cast<std::size_t>(most_pixels) / std::max<std::size_t>(1, cameras.size());
+  for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+    noise[camera].ceiling = ceiling_of(cameras[camera]);
+    std::ranges::move(select(find_pupils(cameras[camera], camera), share, cameras[camera].count()),
+                      std::back_inserter(pupils));
+  }
+  if (pupils.empty()) throw no_result("no stripe of light passes in the frames: no pixel rises and falls once");
+  return Teacher(std::move(pupils), std::move(noise)).run();
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/pixel_time.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "pagesweep/timing/shift_equations.h"
+
+namespace pagesweep {
+namespace {
+
+/// How much of one flank's information about the time, the sum of squared slopes, is there.
+struct Flank {
+  double whole = 0;     ///< were all frames recorded and none clipped
+  double recorded = 0;  ///< within the recording
+  double usable = 0;    ///< neither clipped nor dropped
+  double clipped = 0;
+};
+
+std::array<Flank, 2> examine_flanks(const PixelWindow& window, const Bell& bell, const PixelJudge& judge) {
+  std::array<Flank, 2> flanks;
+  const int begin = static_cast<int>(std::ceil(bell.time + bell.width * judge.profile.begin()));
+  const int end = static_cast<int>(std::floor(bell.time + bell.width * judge.profile.end()));
+  for (int i = begin; i <= end; ++i) {
+    const double slope = judge.profile.derivative((i - bell.time) / bell.width);
+    Flank& flank = flanks[slope > 0 ? 0 : 1];
+    const double information = slope * slope;
+    flank.whole += information;
+    if (i < 0 || i >= judge.frame_count) continue;
+    flank.recorded += information;
+    const int k = i - window.first_frame;
+    if (k < 0 || k >= static_cast<int>(window.gray.size())) continue;
+    const float gray = window.gray[static_cast<std::size_t>(k)];
+    if (std::isfinite(gray)) flank.usable += information;
+    if (std::isinf(gray)) flank.clipped += information;
+  }
+  return flanks;
+}
+
+/// Rms residual around the bell's middle [gray values].
+double core_misfit(const PixelWindow& window, const Bell& bell, const PixelJudge& judge) {
+  const double reach = 0.75 * judge.profile.full_width_half_maximum();
+  double squares = 0;
+  int samples = 0;
+  for (std::size_t k = 0; k < window.gray.size(); ++k) {
+    const double t = (window.first_frame + static_cast<double>(k) - bell.time) / bell.width;
+    if (std::abs(t) > reach || !std::isfinite(window.gray[k])) continue;
+    const double residual = window.gray[k] - bell.amplitude * judge.profile.value(t) - bell.background;
+    squares += residual * residual;
+    ++samples;
+  }
+  return samples > 0 ? std::sqrt(squares / samples) : 0;
+}
+
+/// Reduced chi square beyond which noise cannot be the reason any more: four standard deviations.
+double noise_limit(const BellFit& fit) { return 1 + 4 * std::sqrt(2.0 / std::max(1, fit.samples - 3)); }
+
+PixelTime describe(const PixelWindow& window, const Bell& bell, double sigma, double residual,
+                   const PixelJudge& judge) {
+  return {.time = bell.time,
+          .sigma = sigma,
+          .amplitude = bell.amplitude,
+          .residual = residual,
+          .bell_time = bell.time,
+          .status = judge_bell(window, bell, sigma, judge)};
+}
+
+}  // namespace
+
+PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma, const PixelJudge& judge) {
+  constexpr double least_recorded = 0.6, least_usable = 0.02, most_misfit = 0.1;
+  if (!std::isfinite(bell.time) || !std::isfinite(sigma)) return PixelStatus::bad_fit;
+  if (bell.time < 0 || bell.time > judge.frame_count - 1) return PixelStatus::truncated;
+  const auto flanks = examine_flanks(window, bell, judge);
+  for (const Flank& flank : flanks)
+    if (flank.recorded < least_recorded * flank.whole) return PixelStatus::truncated;
+  for (const Flank& flank : flanks)
+    if (flank.usable < least_usable * flank.whole)
+      return flank.clipped > 0 ? PixelStatus::saturated : PixelStatus::truncated;
+  if (!(bell.amplitude >= judge.min_amplitude) || !(bell.amplitude > 0) || sigma > judge.max_sigma)
+    return PixelStatus::too_dark;
+  const double noise = std::sqrt(judge.noise.variance(bell.background + bell.amplitude));
+  const double misfit = core_misfit(window, bell, judge);
+  return misfit > 3 * noise && misfit > most_misfit * bell.amplitude ? PixelStatus::bad_fit : PixelStatus::ok;
+}
+
+PixelTime time_by_center_of_mass(const PixelWindow& window, const PixelJudge& judge) {
+  Bell bell = window.start;
+  const auto ceiling = static_cast<float>(judge.noise.ceiling);
+  // Background: mean of what lies outside the profile's support.
+  double outside = 0, background = 0, highest = 0;
+  const auto time_of = [&](std::size_t k) { return window.first_frame + static_cast<double>(k); };
+  for (std::size_t k = 0; k < window.gray.size(); ++k) {
+    const double gray = std::min(window.gray[k], ceiling);
+    if (std::isnan(window.gray[k])) continue;
+    highest = std::max(highest, gray);
+    if (std::abs(time_of(k) - bell.time) < 0.8 * judge.profile.end() * bell.width) continue;
+    background += gray;
+    outside += 1;
+  }
+  if (outside > 0) bell.background = background / outside;
+  bell.amplitude = std::max(highest - bell.background, 0.0);
+  const double threshold = bell.background + centre_threshold * bell.amplitude;
+  double mass = 0, moment = 0, scatter = 0;
+  for (int pass = 0; pass < 2; ++pass) {
+    if (pass == 1) bell.time = moment / mass;
+    for (std::size_t k = 0; k < window.gray.size(); ++k) {
+      const double gray = std::min(window.gray[k], ceiling);
+      if (!(gray > threshold) || std::isnan(window.gray[k])) continue;
+      if (pass == 0) {
+        mass += gray - threshold;
+        moment += (gray - threshold) * time_of(k);
+      } else {
+        const double lever = (time_of(k) - bell.time) / mass;
+        scatter += lever * lever * judge.noise.variance(gray);
+      }
+    }
+    if (!(mass > 0)) return {};
+  }
+  return describe(window, bell, std::sqrt(scatter), 1, judge);
+}
+
+PixelTime time_by_shift(const PixelWindow& window, const PixelJudge& judge) {
+  constexpr int longest = 512;  // [frames] of a profile: far more than a stripe of use is long
+  const double width = window.start.width;
+  const int before = static_cast<int>(std::ceil(-judge.profile.begin() * width));
+  const int after = static_cast<int>(std::ceil(judge.profile.end() * width));
+  std::array<float, longest> f;
+  const int count = std::min(longest, before + after + 1);
+  for (int k = 0; k < count; ++k)
+    f[static_cast<std::size_t>(k)] = static_cast<float>(judge.profile.value((k - before) / width));
+  const int start = static_cast<int>(window.start.time) - window.first_frame - before;
+  const auto shift = refine_shift({f.data(), static_cast<std::size_t>(count)}, window.gray, start);
+  if (!shift) {
+    PixelTime unsolved;
+    unsolved.amplitude = window.start.amplitude;
+    unsolved.status = std::ranges::any_of(window.gray, [](float gray) { return std::isinf(gray); })
+                          ? PixelStatus::saturated
+                          : PixelStatus::truncated;
+    return unsolved;
+  }
+  const Bell bell{shift->a, shift->b, shift->c + window.first_frame + before, width};
+  const double noise = std::sqrt(judge.noise.variance(bell.background + 0.5 * bell.amplitude));
+  return describe(window, bell, shift->sigma, shift->residual_rms / noise, judge);
+}
+
+PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge) {
+  BellFit fit = fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, window.start);
+  const double chi_square = fit.reduced_chi_square(), limit = noise_limit(fit);
+  double scale = 1;
+  if (chi_square > limit) {
+    fit = fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, fit.converged ? fit.bell : window.start,
+                   {.robust = true});
+    scale = std::max(1.0, fit.reduced_chi_square() / limit);
+  }
+  PixelTime result = describe(window, fit.bell, fit.time_sigma() * std::sqrt(scale), std::sqrt(chi_square), judge);
+  if (!fit.converged && result.status == PixelStatus::ok) result.status = PixelStatus::bad_fit;
+  return result;
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "pagesweep/data/status.h"
+#include "pagesweep/timing/row_windows.h"
+
+namespace pagesweep {
+
+/// What an estimator says about one pixel.
+struct PixelTime {
+  double time = 0;       ///< [frames]
+  double sigma = 0;      ///< [frames]
+  double amplitude = 0;  ///< [gray values]
+  double residual = 0;   ///< rms over the noise expected
+  double bell_time = 0;  ///< [frames] where the bell was found, whatever the status
+  PixelStatus status = PixelStatus::too_dark;
+};
+
+/// All that is the same for every pixel of a camera.
+struct PixelJudge {
+  const StripeProfile& profile;
+  SensorNoise noise;
+  int frame_count = 0;
+  double min_amplitude = 0;  ///< [gray values]
+  double max_sigma = 0.5;    ///< [frames]
+};
+
+/// Centre of mass of what rises above a fifth of the bell's height, background removed. Clipped samples count as the
+/// ceiling.
+PixelTime time_by_center_of_mass(const PixelWindow& window, const PixelJudge& judge);
+
+/// Eq. 8-10 against the profile sampled at whole frames.
+PixelTime time_by_shift(const PixelWindow& window, const PixelJudge& judge);
+
+/// Maximum likelihood against the smooth profile, see fit_bell(). Where the bell does not explain all that is seen (a
+/// second hump, a glint), once more with outliers weighted down.
+PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge);
+
+/// What the samples say about a bell, whichever estimator found it: ok, or too_dark, truncated, saturated, bad_fit.
+/// Each flank must have been recorded for the most part and be represented by samples that are neither clipped nor
+/// dropped; samples around the middle must follow the profile to within a few percent of the height.
+PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma, const PixelJudge& judge);
+
+}  // namespace pagesweep

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/row_windows.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pagesweep {
+
+RowWindows::RowWindows(const Frames& frames, const StripeProfile& profile, const SensorNoise& noise, bool keep_clipped)
+    : frames_(frames),
+      profile_(profile),
+      noise_(noise),
+      keep_clipped_(keep_clipped),
+      // Beyond the support there is background, which the fit wants to see too.
+      reach_(std::max(-profile.begin(), profile.end()) + 0.25 * profile.full_width_half_maximum() + 1),
+      search_(profile.full_width_half_maximum()) {}
+
+void RowWindows::read(int y) {
+  frames_.read_row(y, samples_);
+  search_.find(samples_, static_cast<float>(noise_.ceiling));
+}
+
+PixelWindow RowWindows::window_at(int x, double width, int centre) {
+  const int reach = static_cast<int>(std::ceil(reach_ * width));
+  const int begin = std::max(0, centre - reach), end = std::min(frames_.count(), centre + reach + 1);
+  const auto naive = static_cast<float>(noise_.ceiling + 0.5);
+  gray_.clear();
+  float lowest = std::numeric_limits<float>::infinity();
+  for (int i = begin; i < end; ++i) {
+    const float gray = samples_(x, i);
+    lowest = gray < lowest ? gray : lowest;
+    gray_.push_back(keep_clipped_ && std::isinf(gray) ? naive : gray);
+  }
+  PixelWindow window{gray_, begin, {}};
+  window.start.background = std::isfinite(lowest) ? lowest : 0;
+  window.start.time = centre;
+  window.start.width = width;
+  window.start.amplitude = start_amplitude(window, width);
+  return window;
+}
+
+double RowWindows::start_amplitude(const PixelWindow& window, double width) const {
+  float highest = 0;
+  int clipped = 0;
+  for (const float gray : window.gray) {
+    clipped += std::isinf(gray);
+    highest = std::isfinite(gray) && gray > highest ? gray : highest;
+  }
+  const double seen = std::max(highest - window.start.background, 1.0);
+  if (clipped == 0) return seen;
+  // The longer the plateau, the higher the bell must be that was cut off there.
+  const double end = 0.5 * (clipped + 1) / width;
+  const double cut_at = std::max(0.5 * (profile_.value(-end) + profile_.value(end)), 0.02);
+  return std::max(seen, (noise_.ceiling - window.start.background) / cut_at);
+}
+
+}  // namespace pagesweep

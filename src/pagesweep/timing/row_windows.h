@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pagesweep/data/frames.h"
+#include "pagesweep/timing/bell_fit.h"
+#include "pagesweep/timing/stripe_search.h"
+
+namespace pagesweep {
+
+/// The part of one pixel's gray value sequence that surrounds the stripe, and what a first look at it tells.
+struct PixelWindow {
+  std::span<const float> gray;  ///< consecutive samples; NaN: dropped, +infinity: clipped
+  int first_frame = 0;          ///< time of gray[0]
+  Bell start;                   ///< rough, good enough to start any estimator from
+};
+
+/// Reads the pixels of one camera row by row and cuts the stripe's surroundings out of each sequence. One a thread.
+class RowWindows {
+ public:
+  /// \param keep_clipped  clipped samples stay in as if the saturation level had been measured (the naive way)
+  RowWindows(const Frames& frames, const StripeProfile& profile, const SensorNoise& noise, bool keep_clipped = false);
+
+  void read(int y);
+  /// How many standard deviations the stripe search's response lies above what noise alone would give.
+  double significance(int x) const { return search_.rise(x) / search_.rise_sigma(noise_.read_variance); }
+  /// \param width  of the stripe there, relative to the profile's
+  PixelWindow window(int x, double width) { return window_at(x, width, search_.frame(x)); }
+  PixelWindow window_at(int x, double width, int centre);
+  int frame_count() const { return frames_.count(); }
+
+ private:
+  double start_amplitude(const PixelWindow& window, double width) const;
+
+  const Frames& frames_;
+  const StripeProfile& profile_;
+  const SensorNoise noise_;
+  const bool keep_clipped_;
+  double reach_;  ///< [frames] to both sides of the stripe's middle, at width 1
+  StripeSearch search_;
+  Image<float> samples_;
+  std::vector<float> gray_;
+};
+
+}  // namespace pagesweep

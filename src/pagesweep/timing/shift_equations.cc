@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/shift_equations.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace pagesweep {
+namespace {
+
+/// A^T A, A^T b and b^T b of eq. 9.
+struct NormalEquations {
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double squares = 0;
+  int rows = 0;
+
+  void add(double f, double g, double step, int start) {
+    const Eigen::Vector3d row(f, 1, step);
+    const double value = g - start * step;
+    matrix += row * row.transpose();
+    right += value * row;
+    squares += value * value;
+    ++rows;
+  }
+};
+
+}  // namespace
+
+std::optional<Shift> solve_shift(std::span<const float> f, std::span<const float> g, int start) {
+  constexpr int fewest_rows = 4;  // 3 unknowns and something left to judge them by
+  const int first = std::max(0, -start);
+  const int last = std::min(static_cast<int>(f.size()), static_cast<int>(g.size()) - 1 - start);
+  NormalEquations equations;
+  for (int k = first; k < last; ++k) {
+    const float f_k = f[static_cast<std::size_t>(k)];
+    const float g_k = g[static_cast<std::size_t>(start + k)];
+    const float step = g[static_cast<std::size_t>(start + k + 1)] - g_k;
+    if (std::isfinite(f_k) && std::isfinite(g_k) && std::isfinite(step)) equations.add(f_k, g_k, step, start);
+  }
+  if (equations.rows < fewest_rows) return std::nullopt;
+  const Eigen::LDLT<Eigen::Matrix3d> solver(equations.matrix);
+  const Eigen::Vector3d x = solver.solve(equations.right);
+  const double variance_factor = solver.solve(Eigen::Vector3d::UnitZ()).z();
+  // No usable gray value has a relative precision of 1e-9: beyond that the rows say nothing about c.
+  if (!x.allFinite() || !(variance_factor > 0) || solver.rcond() < 1e-14) return std::nullopt;
+  const double left = std::max(0.0, equations.squares - x.dot(equations.right));
+  return Shift{.a = x(0),
+               .b = x(1),
+               .c = -x(2),
+               .sigma = std::sqrt(left / (equations.rows - 3) * variance_factor),
+               .residual_rms = std::sqrt(left / equations.rows),
+               .rows = equations.rows};
+}
+
+std::optional<Shift> refine_shift(std::span<const float> f, std::span<const float> g, int start) {
+  constexpr int most_steps = 30;
+  std::optional<Shift> best = solve_shift(f, g, start);
+  for (int step = 0; best && step < most_steps; ++step) {
+    const int reach = static_cast<int>(f.size());
+    const int proposed = std::clamp(static_cast<int>(std::floor(best->c)), start - reach, start + reach);
+    int next = start;
+    for (const int candidate : {proposed, start - 1, start + 1}) {
+      const auto shift = solve_shift(f, g, candidate);
+      if (!shift || shift->residual_rms >= best->residual_rms) continue;
+      best = shift;
+      next = candidate;
+    }
+    if (next == start) break;
+    start = next;
+  }
+  return best;
+}
+
+int peak_position(std::span<const float> samples) {
+  int first = -1, last = -1;
+  for (int i = 0; i < static_cast<int>(samples.size()); ++i) {
+    const float sample = samples[static_cast<std::size_t>(i)];
+    if (std::isnan(sample)) continue;
+    if (first < 0 || sample > samples[static_cast<std::size_t>(first)]) first = last = i;
+    if (sample == samples[static_cast<std::size_t>(first)]) last = i;
+  }
+  return first < 0 || !std::isinf(samples[static_cast<std::size_t>(first)]) ? first : (first + last) / 2;
+}
+
+int start_shift(std::span<const float> f, std::span<const float> g) { return peak_position(g) - peak_position(f); }
+
+}  // namespace pagesweep

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pagesweep/base/image.h"
+
+namespace pagesweep {
+
+/// Finds where, roughly, the stripe passes each pixel of a row: the start values of all estimators.
+///
+/// Each gray value sequence is filtered with a box as long as the stripe minus the mean of two such boxes before and
+/// after it: nearly a matched filter, blind to constant and slowly drifting light, and its cost does not depend on the
+/// stripe's width. The highest response is the most significant bell, be there a second hump or a glint.
+class StripeSearch {
+ public:
+  /// \param fwhm  full width of the stripe at half height [frames]
+  explicit StripeSearch(double fwhm);
+
+  /// \param samples  as Frames::read_row() makes them: one row a frame, NaN dropped, +infinity clipped
+  /// \param ceiling  [gray values] that a clipped sample stands for at least
+  void find(const Image<float>& samples, float ceiling);
+
+  int frame(int x) const { return frame_[static_cast<std::size_t>(x)]; }  ///< nearest to the bell's middle
+  float rise(int x) const { return rise_[static_cast<std::size_t>(x)]; }  ///< filter response [gray values]
+  /// Standard deviation of rise() where only noise of this variance is seen.
+  double rise_sigma(double variance) const;
+
+ private:
+  void accumulate(const Image<float>& samples, float ceiling);
+  void filter();
+  void centre_clipped(const Image<float>& samples);
+
+  int box_;            ///< [frames] odd
+  int distance_;       ///< [frames] from the box to those beside it
+  Image<float> sums_;  ///< row i: sum of the frames before i
+  std::vector<int> frame_;
+  std::vector<float> rise_, last_;
+};
+
+}  // namespace pagesweep

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "pagesweep/base/image.h"
+#include "pagesweep/data/frames.h"
+#include "pagesweep/timing/sensor_noise.h"
+#include "pagesweep/timing/stripe_profile.h"
+
+namespace pagesweep {
+
+/// How wide the stripe is in each part of a camera's picture, relative to its profile. Light diverges, so paper nearer
+/// to the lamp sees a narrower stripe; unless that is known, bright pixels fit worse than their noise allows, and time
+/// values from one flank (skewed stripes, clipped samples) are off.
+class StripeWidths {
+ public:
+  StripeWidths() = default;
+  StripeWidths(Image<float> log_width, int tile_px) : log_width_(std::move(log_width)), tile_px_(tile_px) {}
+
+  /// Relative width at a pixel, bilinear between the tiles' middles; 1 if nothing is known.
+  double at(int x, int y) const;
+  /// Of the tiles, lowest and highest.
+  std::pair<double, double> range() const;
+
+ private:
+  Image<float> log_width_;  ///< one entry a tile
+  int tile_px_ = 1;
+};
+
+/// Measures them: robust weighted means, tile by tile, over a sparse grid of pixels whose width is fitted as a fourth
+/// unknown. Tiles without light take their neighbours' value.
+StripeWidths measure_widths(const Frames& frames, const StripeProfile& profile, const SensorNoise& noise);
+
+}  // namespace pagesweep
