@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/surfacing/differences.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pagesweep/base/parallel.h"
+#include "pagesweep/surfacing/flatten.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr double ease_mm = 15;
+constexpr double model_noise_mm = 0.02;
+
+Support support_of(const HeightField& field, int i, int j) {
+  const CellMean& cell = field.cells(i, j);
+  Support place;
+  place.plan = {field.p_of(i) + cell.p, field.q_of(j) + cell.q};
+  place.z = cell.z;
+  // Neighbouring points err alike to some degree, so that no cell is worth more than this.
+  place.weight = 1 / (field.noise_factor * field.noise_factor / cell.weight + model_noise_mm * model_noise_mm);
+  place.covariance << cell.pp, cell.pq, cell.pq, cell.qq;
+  return place;
+}
+
+/// Cells in or within two cells of the page.
+Image<std::uint8_t> widen(const Image<std::uint8_t>& page) {
+  Image<std::uint8_t> wide(page.width(), page.height(), 0);
+  for (int j = 0; j < page.height(); ++j)
+    for (int i = 0; i < page.width(); ++i)
+      if (page(i, j))
+        for (int dj = -2; dj <= 2; ++dj)
+          for (int di = -2; di <= 2; ++di)
+            if (wide.contains(i + di, j + dj)) wide(i + di, j + dj) = 1;
+  return wide;
+}
+
+/// Fills the cells without a measurement with the solution of a screened membrane, laplace(dz) = dz / ease^2, that
+/// hangs from the measured ones: it goes on smoothly and eases to 0.
+void ease_out(Image<double>& dz, const Image<std::uint8_t>& known, double cell_mm) {
+  const double screen = 4 + std::pow(cell_mm / ease_mm, 2);
+  const double relaxation = 1.7;
+  for (int sweep = 0; sweep < 60; ++sweep)
+    for (int j = 0; j < dz.height(); ++j)
+      for (int i = 0; i < dz.width(); ++i) {
+        if (known(i, j)) continue;
+        const double sum = (i > 0 ? dz(i - 1, j) : 0) + (i + 1 < dz.width() ? dz(i + 1, j) : 0) +
+                           (j > 0 ? dz(i, j - 1) : 0) + (j + 1 < dz.height() ? dz(i, j + 1) : 0);
+        dz(i, j) += relaxation * (sum / screen - dz(i, j));
+      }
+}
+
+}  // namespace
+
+double Differences::at(double p_mm, double q_mm) const {
+  const double i = field->i_of(p_mm), j = field->j_of(q_mm);
+  if (!(i >= 0 && j >= 0 && i <= dz.width() - 1 && j <= dz.height() - 1)) return 0;
+  return interpolate_nodes(dz, i, j);
+}
+
+std::vector<Support> places_of(const HeightField& field, const Image<std::uint8_t>& page) {
+  std::vector<Support> places;
+  for (int j = 0; j < field.rows(); ++j)
+    for (int i = 0; i < field.columns(); ++i)
+      if (page(i, j) && field.cells(i, j).weight > 0) places.push_back(support_of(field, i, j));
+  return places;
+}
+
+Differences measure_differences(const HeightField& field, const Image<std::uint8_t>& page, const RuledSurface& model,
+                                double radius_mm) {
+  Image<CellMean> cells(field.columns(), field.rows());
+  for (int j = 0; j < field.rows(); ++j)
+    for (int i = 0; i < field.columns(); ++i) {
+      if (!page(i, j) || !(field.cells(i, j).weight > 0)) continue;
+      cells(i, j) = field.cells(i, j);
+      const Support place = support_of(field, i, j);
+      cells(i, j).z = static_cast<float>(place.z - height_over(model, place));
+    }
+  Differences differences{&field, Image<double>(field.columns(), field.rows(), 0),
+                          Image<float>(field.columns(), field.rows(), not_a_number), field.status};
+  const Image<std::uint8_t> wide = widen(page);
+  Image<std::uint8_t> known(field.columns(), field.rows(), 0);
+  const double radius = std::max(radius_mm, 2.5 * field.cell_mm);
+  parallel_rows(field.rows(), [&](int j) {
+    LocalFitter fitter(cells, field.cell_mm);
+    for (int i = 0; i < field.columns(); ++i) {
+      // A height that was measured but does not belong to this page is off its surface.
+      PixelStatus& status = differences.status(i, j);
+      if (status == PixelStatus::ok) status = PixelStatus::off_surface;
+      if (!wide(i, j)) continue;
+      const LocalFit fit = fitter.fit_along_edges(i, j, radius, 2, 2.5 * std::max(1.0, field.noise_factor));
+      if (!fit.ok) continue;
+      differences.dz(i, j) = fit.z;
+      differences.sigma(i, j) = static_cast<float>(fit.sigma * std::max(field.noise_factor, fit.scatter));
+      status = PixelStatus::ok;
+      known(i, j) = 1;
+    }
+  });
+  ease_out(differences.dz, known, field.cell_mm);
+  return differences;
+}
+
+Eigen::Vector3d measured_above(const RuledSurface& model, const Differences& differences, const Eigen::Vector3d& point,
+                               const Eigen::Vector3d& normal) {
+  Eigen::Vector3d above = point;
+  // Newton's method along the normal; the derivative is that of the model.
+  for (int step = 0; step < 4; ++step) {
+    const Eigen::Vector2d plan = above.head<2>();
+    const double missing = model.height(plan) + differences.at(plan.x(), plan.y()) - above.z();
+    above += missing * normal.z() * normal;
+  }
+  return above;
+}
+
+}  // namespace pagesweep

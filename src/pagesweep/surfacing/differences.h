@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "pagesweep/surfacing/ruled_surface.h"
+#include "pagesweep/surfacing/smooth_points.h"
+
+namespace pagesweep {
+
+/// How far the measured surface lies above a model, smoothed: dz(p, q) [mm] on the grid of a height field.
+struct Differences {
+  const HeightField* field = nullptr;  ///< the grid; must outlive this
+  Image<double> dz;                    ///< [mm] everywhere; away from measurements it eases to 0 within some 15 mm
+  Image<float> sigma;                  ///< [mm] its standard deviation; NaN where it is not measured
+  Image<PixelStatus> status;           ///< whether it is measured, else why not
+
+  double at(double p_mm, double q_mm) const;
+};
+
+/// The measured places of a page.
+/// \param page  which cells of the field belong to it
+std::vector<Support> places_of(const HeightField& field, const Image<std::uint8_t>& page);
+
+/// Local robust fits to the differences between a page's cells and the model. What the model takes away, the page's
+/// bend, the neighbourhood need not follow; dents remain, and the other page stays out of it.
+Differences measure_differences(const HeightField& field, const Image<std::uint8_t>& page, const RuledSurface& model,
+                                double radius_mm);
+
+/// The measured point orthogonally above a point of the model.
+/// \param point, normal  plan coordinates; the normal is of unit length and points up
+Eigen::Vector3d measured_above(const RuledSurface& model, const Differences& differences, const Eigen::Vector3d& point,
+                               const Eigen::Vector3d& normal);
+
+}  // namespace pagesweep

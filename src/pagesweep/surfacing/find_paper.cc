@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/surfacing/find_paper.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace pagesweep {
+namespace {
+
+constexpr double print_mm = 5;          // half of the largest dark stroke that paper closes around
+constexpr double clear_contrast = 0.6;  // table: brightness below this share of the paper's
+constexpr double step_mm = 1;           // height step between neighbours that ends a surface
+constexpr double steepest = 2.2;        // dz / d(p, q) beyond which a surface ends (65 degrees)
+constexpr double edge_drop_mm = 1.5;    // table lies lower than the paper's edge by more
+constexpr double table_depth_mm = 5, table_flatness_mm = 0.7;
+
+/// Largest (or smallest) value within `reach` cells along the rows, or along the columns; NaN where there is none.
+template <class Better>
+Image<float> extreme(const Image<float>& image, int reach, bool along_rows, Better better) {
+  Image<float> result(image.width(), image.height(), not_a_number);
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x)
+      for (int k = -reach; k <= reach; ++k) {
+        const int i = along_rows ? x + k : x, j = along_rows ? y : y + k;
+        if (!image.contains(i, j) || std::isnan(image(i, j))) continue;
+        if (std::isnan(result(x, y)) || better(image(i, j), result(x, y))) result(x, y) = image(i, j);
+      }
+  return result;
+}
+
+/// Brightness of the ground that print stands on: grey value closing, which fills what is narrower than two reaches.
+Image<float> close_print(const Image<float>& brightness, int reach) {
+  const auto larger = std::greater<float>{};
+  const auto smaller = std::less<float>{};
+  const Image<float> grown = extreme(extreme(brightness, reach, true, larger), reach, false, larger);
+  return extreme(extreme(grown, reach, true, smaller), reach, false, smaller);
+}
+
+/// Otsu's threshold on the logarithm of the brightness; 0 if the two classes do not differ clearly.
+double split_brightness(const Image<float>& ground, const Image<std::uint8_t>& measured) {
+  std::vector<double> logs;
+  for (std::size_t k = 0; k < ground.size(); ++k)
+    if (measured.data()[k] && ground.data()[k] > 0) logs.push_back(std::log(static_cast<double>(ground.data()[k])));
+  if (logs.size() < 2) return 0;
+  std::ranges::sort(logs);
+  double total = 0;
+  for (const double x : logs) total += x;
+  const auto n = static_cast<double>(logs.size());
+  double below = 0, best = 0, threshold = 0, contrast = 1;
+  for (std::size_t k = 0; k + 1 < logs.size(); ++k) {
+    below += logs[k];
+    const auto m = static_cast<double>(k + 1);
+    const double difference = (total - below) / (n - m) - below / m;
+    const double between = m * (n - m) * difference * difference;
+    if (between > best) {
+      best = between;
+      threshold = 0.5 * (logs[k] + logs[k + 1]);
+      contrast = std::exp(-difference);
+    }
+  }
+  return contrast < clear_contrast ? std::exp(threshold) : 0;
+}
+
+/// A connected piece of surface of one brightness class.
+struct Piece {
+  bool bright = true;
+  std::vector<int> cells;                         // j * columns + i
+  double middle_z = 0, lower_z = 0, upper_z = 0;  // median and quartiles [mm]
+  double rim_outside = 0;                         // share of its rim that borders on nothing
+  double drop_mm = 0;  // median of the paper's height minus its own along their common border
+  int borders = 0;     // length of that border [cells]
+  bool paper = false;
+};
+
+class Pieces {
+ public:
+  Pieces(const HeightField& field, const Image<std::uint8_t>& measured, const Image<std::uint8_t>& bright)
+      : field_(field), measured_(measured), bright_(bright), label_(field.columns(), field.rows(), -1) {
+    for (int j = 0; j < field.rows(); ++j)
+      for (int i = 0; i < field.columns(); ++i)
+        if (measured(i, j) && label_(i, j) < 0) grow(i, j);
+  }
+
+  Image<std::uint8_t> choose_paper() {
+    choose_bright_pieces();
+    for (Piece& piece : pieces_)
+      if (!piece.bright) look_at_rim(piece);
+    for (Piece& piece : pieces_)
+      if (!piece.bright) piece.paper = is_printed(piece);
+    Image<std::uint8_t> paper(field_.columns(), field_.rows(), 0);
+    for (const Piece& piece : pieces_)
+      for (const int k : piece.cells) paper.data()[k] = piece.paper;
+    return paper;
+  }
+
+ private:
+  static constexpr std::array<std::pair<int, int>, 4> neighbours{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+
+  bool joined(int i, int j, int i2, int j2) const {
+    return std::abs(field_.z(i, j) - field_.z(i2, j2)) < std::max(step_mm, steepest * field_.cell_mm);
+  }
+
+  void grow(int i0, int j0) {
+    const int number = static_cast<int>(pieces_.size());
+    Piece piece;
+    piece.bright = bright_(i0, j0) != 0;
+    piece.cells.push_back(j0 * field_.columns() + i0);
+    label_(i0, j0) = number;
+    std::vector<float> heights;
+    for (std::size_t n = 0; n < piece.cells.size(); ++n) {
+      const int i = piece.cells[n] % field_.columns(), j = piece.cells[n] / field_.columns();
+      heights.push_back(field_.z(i, j));
+      for (const auto& [di, dj] : neighbours) {
+        const int i2 = i + di, j2 = j + dj;
+        if (!measured_.contains(i2, j2) || !measured_(i2, j2) || label_(i2, j2) >= 0) continue;
+        if ((bright_(i2, j2) != 0) != piece.bright || !joined(i, j, i2, j2)) continue;
+        label_(i2, j2) = number;
+        piece.cells.push_back(j2 * field_.columns() + i2);
+      }
+    }
+    std::ranges::sort(heights);
+    piece.lower_z = heights[heights.size() / 4];
+    piece.middle_z = heights[heights.size() / 2];
+    piece.upper_z = heights[heights.size() * 3 / 4];
+    pieces_.push_back(std::move(piece));
+  }
+
+  /// The largest bright piece and what is comparable to it, but not a level ground well below it.
+  void choose_bright_pieces() {
+    const Piece* largest = nullptr;
+    for (const Piece& piece : pieces_)
+      if (piece.bright && (!largest || piece.cells.size() > largest->cells.size())) largest = &piece;
+    if (!largest) return;
+    const auto is_ground = [](const Piece& piece) { return piece.upper_z - piece.lower_z < table_flatness_mm; };
+    // A white table may be larger than the book that lies on it.
+    for (const Piece& piece : pieces_)
+      if (piece.bright && is_ground(*largest) && piece.cells.size() * 10 > largest->cells.size() &&
+          piece.lower_z > largest->middle_z + table_depth_mm)
+        largest = &piece;
+    for (Piece& piece : pieces_) {
+      const bool below = is_ground(piece) && piece.middle_z < largest->lower_z - table_depth_mm;
+      piece.paper = piece.bright && piece.cells.size() * 10 >= largest->cells.size() && (!below || &piece == largest);
+    }
+  }
+
+  void look_at_rim(Piece& piece) {
+    std::vector<float> drops;
+    int rim = 0, outside = 0;
+    for (const int k : piece.cells) {
+      const int i = k % field_.columns(), j = k / field_.columns();
+      for (const auto& [di, dj] : neighbours) {
+        const int i2 = i + 3 * di, j2 = j + 3 * dj;  // a cell on the edge itself sees both sides
+        const int other = label_.contains(i2, j2) ? label_(i2, j2) : -1;
+        if (other == label_(i, j)) continue;
+        ++rim;
+        if (other < 0) ++outside;
+        if (other >= 0 && pieces_[static_cast<std::size_t>(other)].paper)
+          drops.push_back(field_.z(i2, j2) - field_.z(i, j));
+      }
+    }
+    piece.rim_outside = rim > 0 ? static_cast<double>(outside) / rim : 0;
+    piece.borders = static_cast<int>(drops.size());
+    if (drops.empty()) return;
+    std::ranges::nth_element(drops, drops.begin() + static_cast<std::ptrdiff_t>(drops.size() / 2));
+    piece.drop_mm = drops[drops.size() / 2];
+  }
+
+  bool is_printed(const Piece& piece) const {
+    if (piece.borders == 0) return false;
+    if (piece.rim_outside < 0.02) return true;
+    return piece.drop_mm < edge_drop_mm && sides_framed(piece) < 2;
+  }
+
+  /// On how many of its four sides the bright paper has this piece beside at least half of its length.
+  int sides_framed(const Piece& piece) const {
+    int i0 = field_.columns(), i1 = 0, j0 = field_.rows(), j1 = 0;
+    for (const Piece& other : pieces_)
+      if (other.paper && other.bright)
+        for (const int k : other.cells) {
+          const int i = k % field_.columns(), j = k / field_.columns();
+          i0 = std::min(i0, i);
+          i1 = std::max(i1, i);
+          j0 = std::min(j0, j);
+          j1 = std::max(j1, j);
+        }
+    std::vector<char> left(label_.data() ? static_cast<std::size_t>(field_.rows()) : 0, 0), right = left;
+    std::vector<char> below(static_cast<std::size_t>(field_.columns()), 0), above = below;
+    for (const int k : piece.cells) {
+      const int i = k % field_.columns(), j = k / field_.columns();
+      const auto column = static_cast<std::size_t>(i), row = static_cast<std::size_t>(j);
+      if (j >= j0 && j <= j1 && i < i0) left[row] = 1;
+      if (j >= j0 && j <= j1 && i > i1) right[row] = 1;
+      if (i >= i0 && i <= i1 && j < j0) below[column] = 1;
+      if (i >= i0 && i <= i1 && j > j1) above[column] = 1;
+    }
+    const auto framed = [](const std::vector<char>& side, int length) {
+      return 2 * std::ranges::count(side, 1) > length ? 1 : 0;
+    };
+    return framed(left, j1 - j0) + framed(right, j1 - j0) + framed(below, i1 - i0) + framed(above, i1 - i0);
+  }
+
+  const HeightField& field_;
+  const Image<std::uint8_t>& measured_;
+  const Image<std::uint8_t>& bright_;
+  Image<int> label_;
+  std::vector<Piece> pieces_;
+};
+
+/// Takes away the paper cells beside a measured cell that is none: they may hold points of both.
+void trim_mixed_cells(Image<std::uint8_t>& paper, const Image<std::uint8_t>& measured) {
+  const Image<std::uint8_t> before = paper;
+  for (int j = 0; j < paper.height(); ++j)
+    for (int i = 0; i < paper.width(); ++i)
+      for (int dj = -1; dj <= 1; ++dj)
+        for (int di = -1; di <= 1; ++di)
+          if (before.contains(i + di, j + dj) && measured(i + di, j + dj) && !before(i + di, j + dj)) paper(i, j) = 0;
+}
+
+}  // namespace
+
+Image<std::uint8_t> find_paper(const HeightField& field) {
+  Image<std::uint8_t> measured(field.columns(), field.rows(), 0), bright = measured;
+  for (std::size_t k = 0; k < measured.size(); ++k) measured.data()[k] = std::isfinite(field.z.data()[k]);
+  const int reach = std::max(1, static_cast<int>(std::lround(print_mm / field.cell_mm)));
+  const Image<float> ground = close_print(field.intensity, reach);
+  const double threshold = split_brightness(ground, measured);
+  for (std::size_t k = 0; k < bright.size(); ++k) bright.data()[k] = !(ground.data()[k] < threshold);
+  Image<std::uint8_t> paper = Pieces(field, measured, bright).choose_paper();
+  trim_mixed_cells(paper, measured);
+  return paper;
+}
+
+}  // namespace pagesweep

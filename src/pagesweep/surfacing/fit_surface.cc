@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/surfacing/fit_surface.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "pagesweep/base/error.h"
+#include "pagesweep/surfacing/find_gutter.h"
+#include "pagesweep/surfacing/find_paper.h"
+#include "pagesweep/surfacing/lay_flat.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr double smallest_kink = 0.15;  // change of slope below which two pages do not fix the line where they meet
+constexpr double largest_correction_mm = 4;
+constexpr double many_outliers = 0.25;
+
+void check(std::span<const PointMap> cameras, const SurfaceOptions& options) {
+  if (cameras.empty()) throw std::invalid_argument("fit_surface: at least one camera's points are needed");
+  if (!(options.smoothing > 0) || !(options.neighbourhood_mm > 0))
+    throw std::invalid_argument("fit_surface: smoothing and neighbourhood must be greater than 0");
+  if (!std::isfinite(options.reading_direction_rad))
+    throw std::invalid_argument("fit_surface: the reading direction is not a number");
+}
+
+RulingFrame frame_of(const Gutter& gutter) { return {{gutter.p_mm, gutter.q_mm}, -std::atan(gutter.slope), 0}; }
+
+/// The paper on one side of the gutter, as far as it is farther than `gap_mm` from it. A cell on the gutter sees both
+/// pages.
+Image<std::uint8_t> side_of(const HeightField& field, const Image<std::uint8_t>& paper, const RulingFrame& gutter,
+                            GutterSide side, double gap_mm) {
+  Image<std::uint8_t> page(field.columns(), field.rows(), 0);
+  const double sign = side == GutterSide::right ? -1 : 1;
+  for (int j = 0; j < field.rows(); ++j)
+    for (int i = 0; i < field.columns(); ++i) {
+      const double a = gutter.across().dot(Eigen::Vector2d(field.p_of(i), field.q_of(j)) - gutter.origin);
+      page(i, j) = paper(i, j) && sign * a > gap_mm;
+    }
+  return page;
+}
+
+/// One page of the book: its cells and its model.
+struct FittedPage {
+  GutterSide gutter = GutterSide::none;
+  Image<std::uint8_t> cells;
+  std::vector<Support> places;
+  RuledSurface model;
+};
+
+FittedPage fit_page(const HeightField& field, Image<std::uint8_t> cells, GutterSide side,
+                    const std::optional<RulingFrame>& gutter, const SurfaceOptions& options) {
+  FittedPage page;
+  page.gutter = side;
+  page.cells = std::move(cells);
+  page.places = places_of(field, page.cells);
+  page.model = fit_ruled_surface(page.places, {gutter, options.smoothing});
+  return page;
+}
+
+/// The line in which both page models meet, near the present gutter.
+RulingFrame meeting_line(const RuledSurface& left, const RuledSurface& right, const RulingFrame& gutter) {
+  constexpr int places = 15;
+  const double from = std::max(left.b_low, right.b_low), to = std::min(left.b_high, right.b_high);
+  double n = 0, b1 = 0, b2 = 0, a1 = 0, ab = 0;
+  for (int k = 0; k < places; ++k) {
+    const double b = from + (to - from) * (k + 0.5) / places;
+    const auto gap = [&](double a) {
+      const Eigen::Vector2d plan = gutter.plan_from_ruling(a, b);
+      return left.height(plan) - right.height(plan);
+    };
+    double a = 0, slope = 0;
+    for (int step = 0; step < 4; ++step) {
+      slope = (gap(a + 0.05) - gap(a - 0.05)) / 0.1;
+      if (!(slope < -smallest_kink)) break;
+      a = std::clamp(a - gap(a) / slope, -largest_correction_mm, largest_correction_mm);
+    }
+    if (!(slope < -smallest_kink)) continue;
+    n += 1;
+    b1 += b;
+    b2 += b * b;
+    a1 += a;
+    ab += a * b;
+  }
+  const double spread = n * b2 - b1 * b1;
+  if (2 * n < places || !(spread > 0)) return gutter;
+  const double turn = (n * ab - a1 * b1) / spread;
+  const double shift = (a1 - turn * b1) / n;
+  return {gutter.plan_from_ruling(shift, 0), gutter.angle_rad - std::atan(turn), 0};
+}
+
+std::vector<FittedPage> fit_both_pages(const HeightField& field, const Image<std::uint8_t>& paper, RulingFrame gutter,
+                                       const SurfaceOptions& options) {
+  std::vector<FittedPage> pages;
+  const double nearest = 0.75 * field.cell_mm;
+  // The gutter is where the pages meet, and the pages are what ends at the gutter: twice round suffices.
+  for (const double gap : {nearest + 1.5, nearest + 0.3, nearest}) {
+    pages.clear();
+    for (const GutterSide side : {GutterSide::right, GutterSide::left})
+      pages.push_back(fit_page(field, side_of(field, paper, gutter, side, gap), side, gutter, options));
+    if (gap > nearest) gutter = meeting_line(pages[0].model, pages[1].model, gutter);
+  }
+  return pages;
+}
+
+/// A gutter, if the layout is a spread or turns out to be one.
+std::optional<RulingFrame> choose_gutter(const HeightField& field, const Image<std::uint8_t>& paper, Layout layout,
+                                         Progress& progress) {
+  if (layout == Layout::single) return std::nullopt;
+  if (const auto gutter = find_gutter(field, paper, layout == Layout::spread)) return frame_of(*gutter);
+  if (layout == Layout::automatic) return std::nullopt;
+  progress.warn("no gutter was found: the paper is divided in its middle");
+  double n = 0;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const Support& place : places_of(field, paper)) {
+    sum += place.plan;
+    n += 1;
+  }
+  return RulingFrame{sum / std::max(1.0, n), 0, 0};
+}
+
+PageSurface finish_page(const FittedPage& fitted, const HeightField& field, const SurfaceOptions& options) {
+  const Differences differences = measure_differences(field, fitted.cells, fitted.model, options.neighbourhood_mm);
+  FlatPage flat(fitted.model, differences, fitted.places, fitted.gutter);
+  if (options.model == SurfaceModel::developable) flat.follow_measurement();
+  PageSurface page = flat.sample(field.frame);
+  page.model_name = name_of(options.model);
+  return page;
+}
+
+}  // namespace
+
+std::vector<PageSurface> fit_surface(std::span<const PointMap> cameras, const SurfaceOptions& options,
+                                     Progress& progress) {
+  check(cameras, options);
+  progress.begin("surface");
+  const HeightField field =
+      smooth_points(cameras, {options.neighbourhood_mm, 0, options.reading_direction_rad}, progress);
+  if (static_cast<double>(field.outliers) > many_outliers * static_cast<double>(field.points))
+    progress.warn(fmt::format("{} of {} points lie off the surface around them", field.outliers, field.points));
+  const Image<std::uint8_t> paper = find_paper(field);
+  const auto gutter = choose_gutter(field, paper, options.layout, progress);
+  progress.advance(0.5);
+
+  std::vector<FittedPage> fitted;
+  if (gutter)
+    fitted = fit_both_pages(field, paper, *gutter, options);
+  else
+    fitted.push_back(fit_page(field, paper, GutterSide::none, std::nullopt, options));
+  progress.advance(0.75);
+
+  std::vector<PageSurface> pages;
+  for (const FittedPage& page : fitted) {
+    pages.push_back(finish_page(page, field, options));
+    pages.back().index = static_cast<int>(pages.size());
+  }
+  progress.advance(1);
+  return pages;
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/surfacing/flatten.h"
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+namespace pagesweep {
+namespace {
+
+constexpr int most_steps = 12;
+constexpr double settled_mm = 1e-7;
+
+struct Edge {
+  int from, to;  // node numbers
+  double length_mm;
+};
+
+/// Length of the surface curve between two nodes. The chord errs by (h / R)^2 / 24, two half chords by a quarter of
+/// that; extrapolated, the error is of fourth order.
+double curve_length(const Sheet& sheet, double i0, double j0, double i1, double j1) {
+  const auto chords = [&](int pieces) {
+    double sum = 0;
+    Eigen::Vector3d before = sheet.at(i0, j0);
+    for (int k = 1; k <= pieces; ++k) {
+      const double share = static_cast<double>(k) / pieces;
+      const Eigen::Vector3d next = sheet.at(i0 + share * (i1 - i0), j0 + share * (j1 - j0));
+      sum += (next - before).norm();
+      before = next;
+    }
+    return sum;
+  };
+  return (4 * chords(4) - chords(2)) / 3;
+}
+
+std::vector<Edge> edges_of(const Sheet& sheet) {
+  constexpr std::array<std::pair<int, int>, 4> directions{{{1, 0}, {0, 1}, {1, 1}, {-1, 1}}};
+  std::vector<Edge> edges;
+  for (int j = 0; j < sheet.rows; ++j)
+    for (int i = 0; i < sheet.columns; ++i)
+      for (const auto& [di, dj] : directions) {
+        const int i2 = i + di, j2 = j + dj;
+        if (i2 < 0 || i2 >= sheet.columns || j2 >= sheet.rows) continue;
+        edges.push_back({j * sheet.columns + i, j2 * sheet.columns + i2, curve_length(sheet, i, j, i2, j2)});
+      }
+  return edges;
+}
+
+double energy(const std::vector<Edge>& edges, const Eigen::VectorXd& places) {
+  double sum = 0;
+  for (const Edge& e : edges) {
+    const double length = (places.segment<2>(2 * e.to) - places.segment<2>(2 * e.from)).norm();
+    sum += std::pow(length / e.length_mm - 1, 2);
+  }
+  return sum;
+}
+
+/// The Gauss-Newton step. Three coordinates, which turn and shift the whole, are held: both of the middle node and one
+/// of the node above it.
+class Relaxation {
+ public:
+  Relaxation(const Sheet& sheet, std::vector<Edge> edges, Eigen::VectorXd places)
+      : edges_(std::move(edges)), places_(std::move(places)) {
+    const int middle = (sheet.rows / 2) * sheet.columns + sheet.columns / 2;
+    const int below = middle % sheet.columns;
+    held_ = {2 * middle, 2 * middle + 1, 2 * (below == middle ? middle + sheet.columns : below)};
+  }
+
+  void run() {
+    double before = energy(edges_, places_);
+    for (int step = 0; step < most_steps; ++step) {
+      Eigen::VectorXd move = solve();
+      Eigen::VectorXd trial = places_ + move;
+      double after = energy(edges_, trial);
+      for (int halving = 0; halving < 8 && !(after <= before); ++halving) {
+        move *= 0.5;
+        trial = places_ + move;
+        after = energy(edges_, trial);
+      }
+      if (!(after <= before)) return;
+      places_ = trial;
+      before = after;
+      if (move.lpNorm<Eigen::Infinity>() < settled_mm) return;
+    }
+  }
+
+  const Eigen::VectorXd& places() const { return places_; }
+  Distortion distortion() const {
+    Distortion d;
+    for (const Edge& e : edges_) {
+      const double length = (places_.segment<2>(2 * e.to) - places_.segment<2>(2 * e.from)).norm();
+      d.largest = std::max(d.largest, std::abs(length / e.length_mm - 1));
+    }
+    d.rms = std::sqrt(energy(edges_, places_) / static_cast<double>(edges_.size()));
+    return d;
+  }
+
+ private:
+  Eigen::VectorXd solve() {
+    std::vector<Eigen::Triplet<double>> entries;
+    entries.reserve(16 * edges_.size());
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(places_.size());
+    for (const Edge& e : edges_) {
+      const Eigen::Vector2d along = places_.segment<2>(2 * e.to) - places_.segment<2>(2 * e.from);
+      const double length = along.norm();
+      const Eigen::Vector2d g = along / (length * e.length_mm);
+      const double residual = length / e.length_mm - 1;
+      gradient.segment<2>(2 * e.to) += residual * g;
+      gradient.segment<2>(2 * e.from) -= residual * g;
+      for (const int row : {e.from, e.to})
+        for (const int column : {e.from, e.to})
+          for (int a = 0; a < 2; ++a)
+            for (int b = 0; b < 2; ++b)
+              if (2 * row + a >= 2 * column + b)
+                entries.emplace_back(2 * row + a, 2 * column + b, (row == column ? 1 : -1) * g(a) * g(b));
+    }
+    for (const int k : held_) entries.emplace_back(k, k, 1e3);
+    Eigen::SparseMatrix<double> hessian(places_.size(), places_.size());
+    hessian.setFromTriplets(entries.begin(), entries.end());
+    if (!analysed_) cholesky_.analyzePattern(hessian);
+    analysed_ = true;
+    cholesky_.factorize(hessian);
+    return cholesky_.solve(-gradient);
+  }
+
+  std::vector<Edge> edges_;
+  Eigen::VectorXd places_;
+  std::array<int, 3> held_{};
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> cholesky_;
+  bool analysed_ = false;
+};
+
+}  // namespace
+
+Image<Eigen::Vector2d> flatten(const Sheet& sheet, const Image<Eigen::Vector2d>& start, Distortion* distortion) {
+  if (sheet.columns < 2 || sheet.rows < 2 || start.width() != sheet.columns || start.height() != sheet.rows)
+    throw std::invalid_argument("flatten: a start place is needed for each of at least 2 x 2 nodes");
+  Eigen::VectorXd places(2 * static_cast<Eigen::Index>(start.size()));
+  for (std::size_t k = 0; k < start.size(); ++k) places.segment<2>(2 * static_cast<Eigen::Index>(k)) = start.data()[k];
+  Relaxation relaxation(sheet, edges_of(sheet), std::move(places));
+  relaxation.run();
+  if (distortion) *distortion = relaxation.distortion();
+  Image<Eigen::Vector2d> flat(sheet.columns, sheet.rows);
+  for (std::size_t k = 0; k < flat.size(); ++k)
+    flat.data()[k] = relaxation.places().segment<2>(2 * static_cast<Eigen::Index>(k));
+  return flat;
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/surfacing/lay_flat.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "pagesweep/base/parallel.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr double margin_mm = 8;
+constexpr double node_spacing_mm = 4;
+constexpr double coarsest_spacing_mm = 2, finest_spacing_mm = 0.7;
+constexpr double interpolation_error_mm = 0.01;
+
+struct Range {
+  double low = 1e300, high = -1e300;
+  void include(double x) {
+    low = std::min(low, x);
+    high = std::max(high, x);
+  }
+};
+
+Range alpha_range(const RuledSurface& model, std::span<const Support> places, GutterSide gutter) {
+  Range range;
+  for (const Support& place : places) range.include(model.frame.ruling_from_plan(place.plan).x());
+  if (gutter != GutterSide::none) range.include(0);
+  return range;
+}
+
+}  // namespace
+
+CutLength::CutLength(const RuledSurface& surface, double from, double to) : surface_(surface), from_(from) {
+  const int steps = std::max(2, static_cast<int>(std::ceil((to - from) / 0.25)));
+  step_ = (to - from) / steps;
+  lengths_.push_back(0);
+  for (int k = 0; k < steps; ++k) {
+    const double a = from + k * step_;
+    lengths_.push_back(lengths_.back() + step_ / 6 * (speed(a) + 4 * speed(a + 0.5 * step_) + speed(a + step_)));
+  }
+  const double origin = length_at(0);
+  for (double& length : lengths_) length -= origin;
+}
+
+double CutLength::speed(double alpha) const {
+  const double b = 0.5 * (surface_.b_low + surface_.b_high);
+  return std::hypot(1 + surface_.frame.fan * b, surface_.at(alpha, b).slope);
+}
+
+double CutLength::length_at(double alpha) const {
+  const auto last = static_cast<double>(lengths_.size()) - 1;
+  const double k = std::clamp(std::floor((alpha - from_) / step_), 0.0, last - 1);
+  const double begin = from_ + k * step_, x = alpha - begin;
+  const double length = lengths_[static_cast<std::size_t>(k)];
+  if (x < 0) return length + x * speed(from_);
+  if (x > step_) return lengths_.back() + (x - step_) * speed(from_ + last * step_);
+  return length + x / 6 * (speed(begin) + 4 * speed(begin + 0.5 * x) + speed(alpha));
+}
+
+double CutLength::alpha_at(double length_mm) const {
+  const auto above = std::upper_bound(lengths_.begin() + 1, lengths_.end() - 1, length_mm);
+  const auto k = static_cast<double>(above - lengths_.begin() - 1);
+  double alpha = from_ + (k + 0.5) * step_;
+  for (int step = 0; step < 5; ++step) {
+    const double missing = length_mm - length_at(alpha);
+    alpha += missing / speed(alpha);
+    if (std::abs(missing) < 1e-10) break;
+  }
+  return alpha;
+}
+
+FlatPage::FlatPage(const RuledSurface& model, const Differences& differences, std::span<const Support> places,
+                   GutterSide gutter)
+    : model_(model),
+      differences_(differences),
+      gutter_(gutter),
+      cut_(model, alpha_range(model, places, gutter).low, alpha_range(model, places, gutter).high) {
+  const Range alpha = alpha_range(model, places, gutter);
+  const double from = cut_.length_at(alpha.low) - (gutter == GutterSide::left ? 0 : margin_mm);
+  const double to = cut_.length_at(alpha.high) + (gutter == GutterSide::right ? 0 : margin_mm);
+  columns_ = std::max(3, static_cast<int>(std::ceil((to - from) / node_spacing_mm)) + 1);
+  length0_ = from;
+  length_step_ = (to - from) / (columns_ - 1);
+  b0_ = model.b_low - margin_mm;
+  rows_ = std::max(3, static_cast<int>(std::ceil((model.b_high - b0_ + margin_mm) / node_spacing_mm)) + 1);
+  b_step_ = (model.b_high + margin_mm - b0_) / (rows_ - 1);
+  for (const Support& place : places) places_.push_back(place.plan);
+
+  // To begin with: arc length along the cut, length along the ruling, t downwards.
+  Image<Eigen::Vector2d> start(columns_, rows_, Eigen::Vector2d::Zero());
+  const Eigen::Rotation2Dd turn(model.frame.angle_rad);
+  for (int j = 0; j < rows_; ++j)
+    for (int i = 0; i < columns_; ++i) {
+      const Eigen::Vector2d up = turn * Eigen::Vector2d(length0_ + i * length_step_, b0_ + j * b_step_);
+      start(i, j) = {up.x(), -up.y()};
+    }
+  lay_flat(start);
+}
+
+void FlatPage::follow_measurement() {
+  follows_ = true;
+  lay_flat(Image<Eigen::Vector2d>(flat_));
+}
+
+Eigen::Vector3d FlatPage::model_point(double i, double j) const {
+  return model_.point(cut_.alpha_at(length0_ + i * length_step_), b0_ + j * b_step_);
+}
+
+Eigen::Vector3d FlatPage::model_normal(double i, double j) const {
+  const double h = 1e-3;
+  const Eigen::Vector3d across = model_point(i + h, j) - model_point(i - h, j);
+  const Eigen::Vector3d along = model_point(i, j + h) - model_point(i, j - h);
+  return across.cross(along).normalized();
+}
+
+Eigen::Vector3d FlatPage::above(double i, double j) const {
+  return measured_above(model_, differences_, model_point(i, j), model_normal(i, j));
+}
+
+void FlatPage::lay_flat(const Image<Eigen::Vector2d>& start) {
+  flat_ = flatten({columns_, rows_, [this](double i, double j) { return surface_point(i, j); }}, start, &distortion_);
+  turn_upright();
+}
+
+/// Turns the paper so that the gutter runs along t; a single page so that it lies as it is seen from above. Then shifts
+/// (0, 0) to the upper left corner of what is measured.
+void FlatPage::turn_upright() {
+  double sine = 0, cosine = 0;
+  const auto add = [&](const Eigen::Vector2d& is, const Eigen::Vector2d& should) {
+    cosine += is.dot(should);
+    sine += is.x() * should.y() - is.y() * should.x();
+  };
+  if (gutter_ != GutterSide::none) {
+    const int column = gutter_ == GutterSide::left ? 0 : columns_ - 1;
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    for (int j = 0; j < rows_; ++j) mean += flat_(column, j) / rows_;
+    for (int j = 0; j < rows_; ++j) add(flat_(column, j) - mean, {0, 0.5 * (rows_ - 1) - j});
+  } else {
+    Eigen::Vector2d mean_flat = Eigen::Vector2d::Zero(), mean_plan = mean_flat;
+    const auto plan = [&](int i, int j) {
+      const Eigen::Vector3d point = model_point(i, j);
+      return Eigen::Vector2d(point.x(), -point.y());
+    };
+    for (int j = 0; j < rows_; ++j)
+      for (int i = 0; i < columns_; ++i) {
+        mean_flat += flat_(i, j) / static_cast<double>(flat_.size());
+        mean_plan += plan(i, j) / static_cast<double>(flat_.size());
+      }
+    for (int j = 0; j < rows_; ++j)
+      for (int i = 0; i < columns_; ++i) add(flat_(i, j) - mean_flat, plan(i, j) - mean_plan);
+  }
+  const Eigen::Rotation2Dd turn(std::atan2(sine, cosine));
+  for (Eigen::Vector2d& place : flat_.pixels()) place = turn * place;
+  find_outline();
+}
+
+/// Where the measured places lie on the paper, with a margin but none at the gutter.
+void FlatPage::find_outline() {
+  Range s, t;
+  for (const Eigen::Vector2d& plan : places_) {
+    const Eigen::Vector2d ruling = model_.frame.ruling_from_plan(plan);
+    const Eigen::Vector2d paper =
+        interpolate_nodes(flat_, (cut_.length_at(ruling.x()) - length0_) / length_step_, (ruling.y() - b0_) / b_step_);
+    s.include(paper.x());
+    t.include(paper.y());
+  }
+  const auto gutter_s = [&](int column) {
+    double mean = 0;
+    for (int j = 0; j < rows_; ++j) mean += flat_(column, j).x() / rows_;
+    return mean;
+  };
+  if (gutter_ == GutterSide::left) s.low = gutter_s(0);
+  if (gutter_ == GutterSide::right) s.high = gutter_s(columns_ - 1);
+  const Eigen::Vector2d corner(s.low, t.low);
+  for (Eigen::Vector2d& place : flat_.pixels()) place -= corner;
+  low_ = {gutter_ == GutterSide::left ? 0 : -margin_mm, -margin_mm};
+  high_ = {s.high - s.low + (gutter_ == GutterSide::right ? 0 : margin_mm), t.high - t.low + margin_mm};
+}
+
+/// Grid position of a paper spot, by Newton's method.
+Eigen::Vector2d FlatPage::node_at(const Eigen::Vector2d& paper, Eigen::Vector2d guess) const {
+  for (int step = 0; step < 8; ++step) {
+    const double h = 1e-4;
+    const Eigen::Vector2d here = interpolate_nodes(flat_, guess.x(), guess.y());
+    Eigen::Matrix2d jacobian;
+    jacobian.col(0) = (interpolate_nodes(flat_, guess.x() + h, guess.y()) - here) / h;
+    jacobian.col(1) = (interpolate_nodes(flat_, guess.x(), guess.y() + h) - here) / h;
+    const Eigen::Vector2d move = jacobian.inverse() * (paper - here);
+    guess += move;
+    if (move.cwiseAbs().maxCoeff() < 1e-7) break;
+  }
+  return guess;
+}
+
+PageSurface FlatPage::sample_at(double spacing_mm, const PlanFrame& frame) const {
+  PageSurface page;
+  page.spacing_mm = spacing_mm;
+  const int columns = static_cast<int>(std::ceil((high_.x() - low_.x()) / spacing_mm)) + 1;
+  const int rows = static_cast<int>(std::ceil((high_.y() - low_.y()) / spacing_mm)) + 1;
+  page.t0_mm = low_.y();
+  // The grid ends exactly at the gutter; what the last cell is too wide goes to the other side.
+  page.s0_mm = gutter_ == GutterSide::right ? high_.x() - (columns - 1) * spacing_mm : low_.x();
+  page.gutter_at_left = gutter_ == GutterSide::left;
+  page.gutter_at_right = gutter_ == GutterSide::right;
+  page.model = page.measured = Image<Eigen::Vector3f>(columns, rows, Eigen::Vector3f::Zero());
+  page.sigma = Image<float>(columns, rows, not_a_number);
+  page.status = Image<PixelStatus>(columns, rows, PixelStatus::not_computed);
+  const Eigen::Vector2d middle(0.5 * (columns_ - 1), 0.5 * (rows_ - 1));
+  parallel_rows(rows, [&](int j) {
+    Eigen::Vector2d node = middle;
+    for (int i = 0; i < columns; ++i) {
+      node = node_at({page.s_of(i), page.t_of(j)}, node);
+      const Eigen::Vector3d measured = above(node.x(), node.y());
+      page.measured(i, j) = frame.rig_from_plan(measured).cast<float>();
+      page.model(i, j) = frame.rig_from_plan(surface_point(node.x(), node.y())).cast<float>();
+      look_up_status(measured, model_normal(node.x(), node.y()).z(), page.sigma(i, j), page.status(i, j));
+    }
+  });
+  return page;
+}
+
+void FlatPage::look_up_status(const Eigen::Vector3d& measured, double normal_z, float& sigma,
+                              PixelStatus& status) const {
+  const int i = static_cast<int>(std::lround(differences_.field->i_of(measured.x())));
+  const int j = static_cast<int>(std::lround(differences_.field->j_of(measured.y())));
+  if (!differences_.status.contains(i, j)) return;
+  status = differences_.status(i, j);
+  sigma = differences_.sigma(i, j) * static_cast<float>(normal_z);
+}
+
+/// Largest error of the interpolated model in the middle of cells, a sample of them, the gutter's among them.
+double FlatPage::interpolation_error(const PageSurface& page, const PlanFrame& frame) const {
+  double largest = 0;
+  const Eigen::Vector2d middle(0.5 * (columns_ - 1), 0.5 * (rows_ - 1));
+  for (int j = 1; j + 2 < page.rows(); j += std::max(1, page.rows() / 8))
+    for (int i = 0; i + 1 < page.columns(); ++i) {
+      const double s = page.s_of(i + 0.5), t = page.t_of(j + 0.5);
+      const Eigen::Vector2d node = node_at({s, t}, middle);
+      const Eigen::Vector3d exact = frame.rig_from_plan(surface_point(node.x(), node.y()));
+      largest = std::max(largest, (interpolate(page, page.model, s, t) - exact).norm());
+    }
+  return largest;
+}
+
+PageSurface FlatPage::sample(const PlanFrame& frame) const {
+  for (double spacing = coarsest_spacing_mm;; spacing *= 0.75) {
+    PageSurface page = sample_at(spacing, frame);
+    if (0.75 * spacing < finest_spacing_mm || interpolation_error(page, frame) < interpolation_error_mm) return page;
+  }
+}
+
+}  // namespace pagesweep

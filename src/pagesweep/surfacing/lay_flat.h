@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pagesweep/data/page_surface.h"
+#include "pagesweep/surfacing/differences.h"
+#include "pagesweep/surfacing/flatten.h"
+#include "pagesweep/surfacing/ruled_surface.h"
+
+namespace pagesweep {
+
+/// Arc length along the page's cut halfway up, from ruling alpha = 0.
+class CutLength {
+ public:
+  /// \param from, to  range of alpha that is tabulated; beyond it the cut is straight
+  CutLength(const RuledSurface& surface, double from, double to);
+  double length_at(double alpha) const;
+  double alpha_at(double length_mm) const;
+
+ private:
+  double speed(double alpha) const;  ///< d length / d alpha
+
+  const RuledSurface& surface_;
+  double from_, step_;
+  std::vector<double> lengths_;
+};
+
+/// Which end of a page is the gutter.
+enum class GutterSide { none, left, right };
+
+/// A page's model surface and its flattening, as functions.
+class FlatPage {
+ public:
+  /// \param places  the page's measured places: the grid covers them and a margin
+  FlatPage(const RuledSurface& model, const Differences& differences, std::span<const Support> places,
+           GutterSide gutter);
+  /// Takes the measured surface itself for the model: it is laid flat anew, with the least stretching.
+  void follow_measurement();
+
+  /// The page on a regular grid of paper coordinates, fine enough that interpolation errs by less than 0.01 mm.
+  PageSurface sample(const PlanFrame& frame) const;
+  const Distortion& distortion() const { return distortion_; }
+
+ private:
+  Eigen::Vector3d model_point(double i, double j) const;
+  Eigen::Vector3d model_normal(double i, double j) const;
+  Eigen::Vector3d above(double i, double j) const;
+  Eigen::Vector3d surface_point(double i, double j) const { return follows_ ? above(i, j) : model_point(i, j); }
+  void lay_flat(const Image<Eigen::Vector2d>& start);
+  void turn_upright();
+  void find_outline();
+  Eigen::Vector2d node_at(const Eigen::Vector2d& paper, Eigen::Vector2d guess) const;
+  PageSurface sample_at(double spacing_mm, const PlanFrame& frame) const;
+  double interpolation_error(const PageSurface& page, const PlanFrame& frame) const;
+  void look_up_status(const Eigen::Vector3d& measured, double normal_z, float& sigma, PixelStatus& status) const;
+
+  const RuledSurface& model_;
+  const Differences& differences_;
+  std::vector<Eigen::Vector2d> places_;
+  GutterSide gutter_;
+  CutLength cut_;
+  double length0_ = 0, length_step_ = 1, b0_ = 0, b_step_ = 1;
+  int columns_ = 0, rows_ = 0;
+  bool follows_ = false;
+  Image<Eigen::Vector2d> flat_;             ///< [mm] paper (s, t) of each node
+  Eigen::Vector2d low_{0, 0}, high_{0, 0};  ///< [mm] paper coordinates that the grid covers
+  Distortion distortion_;
+};
+
+}  // namespace pagesweep

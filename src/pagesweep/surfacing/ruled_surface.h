@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "pagesweep/surfacing/b_spline.h"
+
+namespace pagesweep {
+
+/// Where the rulings of a page lie as seen from above. With b along the middle ruling and a to its right, both from
+/// `origin`, a ruling is the set of points with the same  alpha = a / (1 + fan b).
+struct RulingFrame {
+  Eigen::Vector2d origin{0, 0};  ///< [mm] plan coordinates (p, q)
+  double angle_rad = 0;          ///< of the middle ruling against the q axis, counter-clockwise
+  double fan = 0;                ///< [1/mm] 0: parallel rulings; else they meet at b = -1 / fan
+
+  Eigen::Vector2d across() const { return {std::cos(angle_rad), std::sin(angle_rad)}; }
+  Eigen::Vector2d along() const { return {-std::sin(angle_rad), std::cos(angle_rad)}; }
+  /// (alpha, b) of a place (p, q)
+  Eigen::Vector2d ruling_from_plan(const Eigen::Vector2d& plan) const;
+  /// (p, q) of (alpha, b)
+  Eigen::Vector2d plan_from_ruling(double alpha, double b) const;
+};
+
+/// The simplified surface model (paper section IV, step 1): straight rulings, and a cut profile that changes from the
+/// lower to the upper page edge:  z(alpha, b) = (1 - tau) f_low(alpha) + tau f_high(alpha),
+/// tau = (b - b_low) / (b_high - b_low). Both profiles are cubic splines. Planes, cylinders and cones are of this form.
+struct RuledSurface {
+  struct Height {
+    double z;          ///< [mm]
+    double slope;      ///< dz / dalpha
+    double curvature;  ///< d2z / dalpha2 [1/mm]
+  };
+
+  RulingFrame frame;
+  double b_low = 0, b_high = 1;  ///< [mm]
+  CubicBSplines splines{{0, 1}};
+  Eigen::VectorXd low, high;  ///< [mm] coefficients
+  double scatter_mm = 0;      ///< robust scale of the distances of the data
+
+  Height at(double alpha, double b) const;
+  /// The point of the surface on ruling alpha at b, plan coordinates.
+  Eigen::Vector3d point(double alpha, double b) const;
+  double height(const Eigen::Vector2d& plan) const;
+};
+
+/// A measured place of the page: the mean of a cell's points.
+struct Support {
+  Eigen::Vector2d plan;        ///< [mm] (p, q)
+  double z;                    ///< [mm]
+  double weight;               ///< [1/mm^2]
+  Eigen::Matrix2d covariance;  ///< [mm^2] of the points' positions within the cell
+};
+
+/// Height of the surface as a cell of finite width sees it: averaged over the cell, to second order.
+double height_over(const RuledSurface& surface, const Support& cell);
+
+struct RuledFitOptions {
+  std::optional<RulingFrame> gutter;  ///< the gutter is the ruling alpha = 0: origin and angle are fixed by it
+  double smoothing = 1;               ///< multiplies the stiffness that generalised cross-validation chooses
+};
+
+/// Robust fit (weighted least squares, Cauchy's weights) of a ruled surface, its rulings' direction and fan included.
+///
+/// The stiffness against bending is chosen by generalised cross-validation (Craven and Wahba 1979). With little data
+/// the splines have fewer pieces; in the end a plane remains.
+/// \throws Error no_result  if there are fewer than 6 places
+RuledSurface fit_ruled_surface(std::span<const Support> cells, const RuledFitOptions& options = {});
+
+}  // namespace pagesweep
