@@ -11,7 +11,7 @@ target_link_libraries(pagesweep_all INTERFACE pagesweep_pipeline)
 
 install(TARGETS pagesweep_all ${libraries} EXPORT pagesweep ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT pagesweep NAMESPACE pagesweep:: FILE pagesweepTargets.cmake DESTINATION ${package_directory})
-install(DIRECTORY src/pagesweep TYPE INCLUDE FILES_MATCHING PATTERN "*.h" PATTERN "*_internal.h" EXCLUDE)
+install(DIRECTORY src/pagesweep TYPE INCLUDE FILES_MATCHING PATTERN "*.h" REGEX "_(internal|testing)\\.h$" EXCLUDE)
 
 configure_package_config_file(cmake/pagesweepConfig.cmake.in pagesweepConfig.cmake
                               INSTALL_DESTINATION ${package_directory})
