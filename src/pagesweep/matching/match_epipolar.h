@@ -18,12 +18,20 @@ enum class Normalisation {
 };
 constexpr auto names_of(Normalisation) { return std::array<std::string_view, 2>{"none", "affine"}; }
 
+/// How a gray value sequence between pixels is made from theirs, along the epipolar curve; across it, linearly.
+enum class Interpolation {
+  linear,  ///< as in the paper; at fine stripes it attenuates, which draws matches towards pixel centres
+  cubic,   ///< Catmull-Rom
+};
+constexpr auto names_of(Interpolation) { return std::array<std::string_view, 2>{"linear", "cubic"}; }
+
 struct MatchOptions {
   double near_mm = 0;
   double far_mm = 0;
   double max_disagreement_px = 0.5;
   double max_sigma_px = 1;
   Normalisation normalisation = Normalisation::affine;
+  Interpolation interpolation = Interpolation::cubic;
   double min_modulation = 0.04;
   double max_dissimilarity = 0.3;
   double min_distinction = 0.04;
@@ -36,6 +44,7 @@ struct MatchOptions {
           "matching there and back may end this far from where it began (or 4 standard deviations, if more)");
     visit("max-match-sigma", max_sigma_px, "px", "a match known less well than this is ambiguous");
     visit("normalisation", normalisation, "", "sequence matcher: what may differ between the cameras' gray values");
+    visit("interpolation", interpolation, "", "sequence matcher: how sequences between pixels are made");
     visit("min-modulation", min_modulation, "of full scale",
           "sequence matcher: a pixel whose gray values vary less is too dark to be matched");
     visit("max-dissimilarity", max_dissimilarity, "of the sequence's energy",

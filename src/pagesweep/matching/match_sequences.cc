@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "pagesweep/base/error.h"
+#include "pagesweep/matching/nearest_place.h"
 #include "pagesweep/matching/sequence_store.h"
 #include "pagesweep/matching/two_way.h"
 
@@ -37,7 +38,7 @@ float squared_difference(const std::int16_t* a, const std::int16_t* b, int lengt
 /// where it runs along the rows, rows where it runs along the columns. Between two crossings the sequence is
 /// interpolated linearly, as everywhere across the curve: the paper's bilinear sub-pixel on a curve.
 struct Crossings {
-  static constexpr int vertices = 6;
+  static constexpr int vertices = SequenceProducts::crossings;
 
   bool along_rows;                                    ///< the curve runs along the picture's rows
   int first;                                          ///< column (or row) of the first crossing
@@ -48,58 +49,6 @@ struct Crossings {
   std::array<double, vertices> weight_squares{};      ///< of the interpolation: what it leaves of noise
   std::array<double, vertices> rounding_variance{};
 };
-
-/// Inner products that hold all distances between one sequence and the polyline of crossings.
-struct Products {
-  double gg = 0;                                             ///< the pixel's own sequence squared
-  std::array<double, Crossings::vertices> gs{}, ss{}, st{};  ///< g.S_i, S_i.S_i, S_i.S_(i+1)
-};
-
-/// Where the polyline of crossings comes nearest to the pixel's sequence.
-struct Nearest {
-  int segment = -1;
-  double share = 0;  ///< of the way to the segment's end
-  double distance_squared = std::numeric_limits<double>::infinity();
-  double slope_squared = 0;  ///< of the change a crossing, as far as no gain or offset can mimic it
-};
-
-/// Distance from a place on segment i. Affine: with the best gain (the offset is gone with the means).
-double distance_squared(const Products& p, std::size_t i, double share, bool affine) {
-  const double keep = 1 - share;
-  const double gs = keep * p.gs[i] + share * p.gs[i + 1];
-  const double ss = keep * keep * p.ss[i] + 2 * keep * share * p.st[i] + share * share * p.ss[i + 1];
-  if (!affine) return p.gg - 2 * gs + ss;
-  return gs > 0 && ss > 0 ? p.gg - gs * gs / ss : p.gg;
-}
-
-/// Where on the line through segment i the distance is least: the closed solution of eq. 2 for linear interpolation.
-double best_share(const Products& p, std::size_t i, bool affine) {
-  if (!affine) {
-    const double length = p.ss[i] - 2 * p.st[i] + p.ss[i + 1];
-    return length > 0 ? (p.gs[i + 1] - p.gs[i] + p.ss[i] - p.st[i]) / length : 0;
-  }
-  // g is projected onto the plane of S_i and S_(i+1); the share is that of their coefficients.
-  const double determinant = p.ss[i] * p.ss[i + 1] - p.st[i] * p.st[i];
-  const double a = p.gs[i] * p.ss[i + 1] - p.gs[i + 1] * p.st[i];
-  const double b = p.gs[i + 1] * p.ss[i] - p.gs[i] * p.st[i];
-  return determinant > 0 && a + b > 0 ? b / (a + b) : (p.gs[i + 1] > p.gs[i] ? 1 : 0);
-}
-
-Nearest nearest_place(const Products& p, const Crossings& crossings, bool affine) {
-  Nearest nearest;
-  for (std::size_t i = 0; i + 1 < Crossings::vertices; ++i) {
-    if (!crossings.usable[i] || !crossings.usable[i + 1]) continue;
-    const double share = std::clamp(best_share(p, i, affine), 0.0, 1.0);
-    const double distance = distance_squared(p, i, share, affine);
-    if (!(distance < nearest.distance_squared)) continue;
-    const double keep = 1 - share;
-    const double ss = keep * keep * p.ss[i] + 2 * keep * share * p.st[i] + share * share * p.ss[i + 1];
-    const double along = keep * (p.st[i] - p.ss[i]) + share * (p.ss[i + 1] - p.st[i]);  // S . dS
-    const double length = p.ss[i] - 2 * p.st[i] + p.ss[i + 1];
-    nearest = {static_cast<int>(i), share, distance, affine && ss > 0 ? length - along * along / ss : length};
-  }
-  return nearest;
-}
 
 /// Finds the least squared difference along epipolar curves.
 class SequenceMatcher final : public Matcher {
@@ -124,9 +73,10 @@ class SequenceMatcher final : public Matcher {
   int scan(int x, int y, const CurveSamples& samples, std::vector<float>& scores) const;
   bool is_distinct(const std::vector<float>& scores, int best, float margin) const;
   Match refine(int x, int y, const EpipolarCurve& curve, double inverse_depth) const;
+  double sigma(int x, int y, const Crossings& crossings, const CurvePlace& place) const;
   bool find_crossings(const EpipolarCurve& curve, double inverse_depth, Crossings& crossings) const;
   void interpolate(Crossings& crossings, std::size_t vertex) const;
-  Products products(const std::int16_t* sequence, const Crossings& crossings) const;
+  SequenceProducts products(const std::int16_t* sequence, const Crossings& crossings) const;
 
   const SequenceStore& from_;
   const SequenceStore& to_;
@@ -229,17 +179,32 @@ float dot(const std::vector<float>& a, const std::vector<float>& b) {
   return sum;
 }
 
-Products SequenceMatcher::products(const std::int16_t* sequence, const Crossings& crossings) const {
+/// Takes out of `slope` what a change of gain would do just as well.
+void remove_gain(const std::int16_t* sequence, std::vector<float>& slope) {
+  float product = 0, square = 0;
+  for (std::size_t k = 0; k < slope.size(); ++k) {
+    product += slope[k] * sequence[k];
+    square += static_cast<float>(sequence[k]) * sequence[k];
+  }
+  const float share = square > 0 ? product / square : 0;
+  for (std::size_t k = 0; k < slope.size(); ++k) slope[k] -= share * sequence[k];
+}
+
+SequenceProducts SequenceMatcher::products(const std::int16_t* sequence, const Crossings& crossings) const {
   thread_local std::vector<float> own;
   own.assign(sequence, sequence + from_.length());
-  Products p;
+  SequenceProducts p;
   p.gg = dot(own, own);
-  for (std::size_t i = 0; i < Crossings::vertices; ++i) {
-    if (!crossings.usable[i]) continue;
-    p.gs[i] = dot(own, crossings.sequence[i]);
-    p.ss[i] = dot(crossings.sequence[i], crossings.sequence[i]);
-    if (i + 1 < Crossings::vertices && crossings.usable[i + 1])
-      p.st[i] = dot(crossings.sequence[i], crossings.sequence[i + 1]);
+  p.usable = crossings.usable;
+  p.gs.setZero();
+  p.ss.setZero();
+  for (int i = 0; i < Crossings::vertices; ++i) {
+    const std::vector<float>& a = crossings.sequence[static_cast<std::size_t>(i)];
+    if (!p.usable[static_cast<std::size_t>(i)]) continue;
+    p.gs[i] = dot(own, a);
+    for (int j = i; j < Crossings::vertices; ++j)
+      if (p.usable[static_cast<std::size_t>(j)])
+        p.ss(i, j) = p.ss(j, i) = dot(a, crossings.sequence[static_cast<std::size_t>(j)]);
   }
   return p;
 }
@@ -247,26 +212,52 @@ Products SequenceMatcher::products(const std::int16_t* sequence, const Crossings
 Match SequenceMatcher::refine(int x, int y, const EpipolarCurve& curve, double inverse_depth) const {
   thread_local Crossings crossings;
   if (!find_crossings(curve, inverse_depth, crossings)) return Match::none(PixelStatus::outside_view);
-  const Nearest nearest = nearest_place(products(from_.sequence(x, y), crossings), crossings, affine_);
+  const CurvePlace nearest =
+      nearest_place(products(from_.sequence(x, y), crossings), options_.normalisation, options_.interpolation);
   if (nearest.segment < 0 || nearest.distance_squared > options_.max_dissimilarity * from_.energy(x, y))
     return Match::none(PixelStatus::no_match);
-  const auto segment = static_cast<std::size_t>(nearest.segment);
-  const double place = nearest.segment + nearest.share;
-  // The residual holds the noise of both pixels; rounding noise is there even where clipping hides the rest.
-  const int unknowns = affine_ ? 3 : 1;
-  const double noise = nearest.distance_squared / std::max(1, from_.samples() - unknowns) +
-                       from_.rounding_variance(x, y) + crossings.rounding_variance[segment];
-  // Noise of the two crossings looks like slope; what exceeds it is known to be slope.
-  const double slope_squared =
-      nearest.slope_squared -
-      from_.samples() * noise * 0.5 * (crossings.weight_squares[segment] + crossings.weight_squares[segment + 1]);
-  const double length = std::hypot(1.0, crossings.slope);  // [px] along the curve a crossing
-  const double sigma_px = slope_squared > 0 ? length * std::sqrt(noise / slope_squared) : infinity;
+  const double sigma_px = std::hypot(1.0, crossings.slope) * sigma(x, y, crossings, nearest);
   if (!(sigma_px <= options_.max_sigma_px)) return Match::none(PixelStatus::ambiguous);
+  const double place = nearest.segment + nearest.share;
   const double depth = crossings.depth_at_first + place * crossings.depth_step;
   const auto pixel = curve.at(depth);
   if (!pixel) return Match::none(PixelStatus::outside_view);
   return {PixelStatus::ok, *pixel, sigma_px, depth};
+}
+
+/// Standard deviation of a place [crossings]. Residuals r and slopes d of the frames give it twice: as in any least
+/// squares, sqrt(mean r^2 / sum d^2), and without the belief that residuals are alike in all frames,
+/// sqrt(sum r^2 d^2) / sum d^2. The second is larger where the sequences differ just where they change, as beside
+/// clipped stripes; the larger one counts.
+double SequenceMatcher::sigma(int x, int y, const Crossings& crossings, const CurvePlace& place) const {
+  thread_local std::vector<float> residual, slope;
+  const std::int16_t* own = from_.sequence(x, y);
+  residual.assign(own, own + from_.length());
+  slope.assign(residual.size(), 0);
+  double rounding = from_.rounding_variance(x, y), slope_noise = 0;
+  for (std::size_t i = 0; i < Crossings::vertices; ++i) {
+    const auto index = static_cast<Eigen::Index>(i);
+    const auto value = static_cast<float>(place.gain * place.value[index]);
+    const auto change = static_cast<float>(place.gain * place.derivative[index]);
+    if (value == 0 && change == 0) continue;
+    const std::vector<float>& s = crossings.sequence[i];
+    for (std::size_t k = 0; k < residual.size(); ++k) {
+      residual[k] -= value * s[k];
+      slope[k] += change * s[k];
+    }
+    rounding += value * value * crossings.weight_squares[i] * crossings.rounding_variance[i];
+    slope_noise += change * change * crossings.weight_squares[i];
+  }
+  if (affine_) remove_gain(own, slope);
+  const double unknowns = affine_ ? 3 : 1, freedom = std::max(1.0, from_.samples() - unknowns);
+  const double noise = dot(residual, residual) / freedom + rounding;
+  for (std::size_t k = 0; k < residual.size(); ++k) residual[k] *= slope[k];
+  const double weighted = dot(residual, residual) * from_.samples() / freedom;
+  // Noise of the crossings looks like slope; what exceeds it is known to be slope. Half of the noise is the pixel's
+  // own.
+  const double slope_squared = dot(slope, slope) - 0.5 * noise * slope_noise * from_.samples();
+  if (!(slope_squared > 0)) return infinity;
+  return std::max(std::sqrt(noise / slope_squared), std::sqrt(weighted) / slope_squared);
 }
 
 void require_size(const Frames& frames, const Camera& camera) {
