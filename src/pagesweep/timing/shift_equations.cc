@@ -45,10 +45,14 @@ std::optional<Shift> solve_shift(std::span<const float> f, std::span<const float
   // No usable gray value has a relative precision of 1e-9: beyond that the rows say nothing about c.
   if (!x.allFinite() || !(variance_factor > 0) || solver.rcond() < 1e-14) return std::nullopt;
   const double left = std::max(0.0, equations.squares - x.dot(equations.right));
+  // A residual is (1 - q) n_k + q n_{k+1}, q = c - c~: over all q, on average 2/3 of a sample's variance. And the noise
+  // in the column of differences, twice that variance a row, passes for slope: it makes c look more certain than it is.
+  const double variance = 1.5 * left / (equations.rows - 3);
+  const double slopes = std::max(1 / variance_factor - 2 * variance * equations.rows, 0.05 / variance_factor);
   return Shift{.a = x(0),
                .b = x(1),
                .c = -x(2),
-               .sigma = std::sqrt(left / (equations.rows - 3) * variance_factor),
+               .sigma = std::sqrt(variance / slopes),
                .residual_rms = std::sqrt(left / equations.rows),
                .rows = equations.rows};
 }

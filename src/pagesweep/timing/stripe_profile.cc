@@ -61,6 +61,7 @@ StripeProfile StripeProfile::fit(std::span<const Point> points, double begin, do
   profile.knots_per_frame_ = 1 / spacing;
   profile.set_coefficients({coefficients.data(), static_cast<std::size_t>(count)});
   profile.normalise();
+  profile.measure_width();
   return profile;
 }
 
@@ -89,14 +90,12 @@ void StripeProfile::normalise() {
   begin_ -= moment / mass;
 }
 
-double StripeProfile::full_width_half_maximum() const {
-  constexpr double step = 1.0 / 64;  // of a knot spacing
-  const auto crossing = [&](double from, double direction) {
-    double t = from;
-    while (value(t) < 0.5 && t >= begin() && t <= end()) t += direction * step * spacing_;
-    return t;
-  };
-  return empty() ? 0 : crossing(end() - 1e-9, -1) - crossing(begin(), 1);
+void StripeProfile::measure_width() {
+  const double step = spacing_ / 64;
+  double rise = begin(), fall = end() - 1e-9;
+  while (value(rise) < 0.5) rise += step;
+  while (value(fall) < 0.5) fall -= step;
+  fwhm_ = fall - rise;
 }
 
 }  // namespace pagesweep

@@ -40,7 +40,7 @@ class StripeProfile {
   double end() const { return begin_ + spacing_ * static_cast<double>(pieces_.size()); }
   bool empty() const { return pieces_.empty(); }
   /// Duration between the two moments at half height [frames].
-  double full_width_half_maximum() const;
+  double full_width_half_maximum() const { return fwhm_; }
 
   Sample at(double time) const {
     const double x = (time - begin_) * knots_per_frame_;
@@ -60,11 +60,13 @@ class StripeProfile {
   };
   void set_coefficients(std::span<const double> coefficients);
   void normalise();
+  void measure_width();
 
   double begin_ = 0;
   double spacing_ = 1;
   double knots_per_frame_ = 1;
   double count_ = 0;
+  double fwhm_ = 0;
   std::vector<Piece> pieces_;
 };
 
