@@ -2,10 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <deque>
 #include <exception>
-#include <stdexcept>
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
@@ -20,9 +18,24 @@ constexpr int instants_ahead = 8;
 
 int depth_of(const GrayImage& image) { return image.index() == 0 ? 8 : 16; }
 
-int brightest(const GrayImage& image) {
-  return std::visit(
-      [](const auto& pixels) { return pixels.empty() ? 0 : int{*std::ranges::max_element(pixels.pixels())}; }, image);
+int highest_gray_value(const GrayImage& image) {
+  return std::visit([](const auto& pixels) { return int{*std::ranges::max_element(pixels.pixels())}; }, image);
+}
+
+/// Checks a frame against what capture.json says about its gray values.
+void require_depth(const GrayImage& image, int bit_depth, const std::filesystem::path& file) {
+  const int expected = bit_depth <= 8 ? 8 : 16;
+  if (depth_of(image) != expected)
+    throw bad_input(file, "",
+                    fmt::format("expected {} bit samples for the bit_depth {} in capture.json, found {} bit", expected,
+                                bit_depth, depth_of(image)));
+  const int limit = 1 << bit_depth;
+  if (bit_depth == expected) return;
+  if (const int highest = highest_gray_value(image); highest >= limit)
+    throw bad_input(file, "",
+                    fmt::format("expected gray values below {} for the bit_depth {} in capture.json, found {}: correct "
+                                "bit_depth, or move the camera's bits down",
+                                limit, bit_depth, highest));
 }
 
 /// Frames of a folder whose files are numbered.
@@ -87,16 +100,7 @@ class FolderSource : public FrameSource {
     const auto file = capture_.frame_path(capture_.sequences[camera], i);
     if (i >= sequence.count || !std::filesystem::exists(file)) return std::nullopt;
     GrayImage image = read_gray(file, ImageSize{sequence.width, sequence.height});
-    if (depth_of(image) != (sequence.bit_depth <= 8 ? 8 : 16))
-      throw bad_input(file, "",
-                      fmt::format("expected {} bit samples for the bit_depth {} of capture.json, found {} bit",
-                                  sequence.bit_depth <= 8 ? 8 : 16, sequence.bit_depth, depth_of(image)));
-    const int limit = 1 << sequence.bit_depth;
-    if (sequence.bit_depth % 8 != 0 && brightest(image) >= limit)
-      throw bad_input(file, "",
-                      fmt::format("expected gray values below {} for the bit_depth {} of capture.json, found {}: "
-                                  "does the camera put its bits into the upper ones of the 16?",
-                                  limit, sequence.bit_depth, brightest(image)));
+    require_depth(image, sequence.bit_depth, file);
     return image;
   }
 

@@ -26,11 +26,11 @@ struct ImageSize {
 GrayImage read_gray(const std::filesystem::path& file, std::optional<ImageSize> expected = std::nullopt);
 
 /// Writes a single-channel PNG.
-/// \param compression  zlib's level, 0 (fast) to 9 (small)
+/// \param compression  zlib's level, 0 (fast) to 9 (small); noise packs hardly better above 1
 /// \throws Error  if it cannot be written
-void write_gray_png(const std::filesystem::path& file, ImageView<const std::uint8_t> image, int compression = 3);
-void write_gray_png(const std::filesystem::path& file, ImageView<const std::uint16_t> image, int compression = 3);
-void write_gray_png(const std::filesystem::path& file, const GrayImage& image, int compression = 3);
+void write_gray_png(const std::filesystem::path& file, ImageView<const std::uint8_t> image, int compression = 1);
+void write_gray_png(const std::filesystem::path& file, ImageView<const std::uint16_t> image, int compression = 1);
+void write_gray_png(const std::filesystem::path& file, const GrayImage& image, int compression = 1);
 
 /// Reads a picture for people from PNG, TIFF, JPEG or JPEG 2000: 8 or 16 bit, gray or RGB, with its resolution, ICC
 /// profile and metadata. Palettes and 1-bit pictures are expanded to 8 bit; alpha is blended over white.

@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstring>
+#include <fstream>
 #include <vips/vips8>
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/io/atomic_file.h"
 #include "pagesweep/io/image_file.h"
+#include "pagesweep/io/jp2_header.h"
 
 namespace pagesweep {
 namespace {
@@ -97,9 +100,43 @@ Image<T> copy_samples(const VImage& image) {
   return samples;
 }
 
+/// Opened by what its first bytes say. libvips could guess, but it knows also formats that can name other files or
+/// take programs to draw, and options in file names.
+VImage open_image(const std::filesystem::path& file) {
+  char start[12] = {};
+  std::ifstream(file, std::ios::binary).read(start, sizeof(start));
+  const std::string_view signature(start, sizeof(start));
+  auto* const options = VImage::option()->set("access", VIPS_ACCESS_SEQUENTIAL)->set("fail_on", VIPS_FAIL_ON_TRUNCATED);
+  const char* name = file.c_str();
+  if (signature.starts_with("\x89PNG")) return VImage::pngload(name, options);
+  if (signature.starts_with("\xff\xd8\xff")) return VImage::jpegload(name, options);
+  if (signature.starts_with("II") || signature.starts_with("MM")) return VImage::tiffload(name, options);
+  if (signature.substr(4).starts_with("jP  ") || signature.starts_with("\xff\x4f\xff\x51"))
+    return VImage::jp2kload(name, options);
+  delete options;
+  throw cannot_read(file, "expected a PNG, TIFF, JPEG or JPEG 2000, found none of their first bytes");
+}
+
+/// [px/mm] 0: unknown, for which libvips has defaults.
+double resolution_of(const VImage& image) {
+  const double default_of_png = 2.834;  // 72 dpi, but not as a PNG would say it
+  const bool is_png = std::string_view(image.get_string("vips-loader")) == "pngload";
+  const bool is_unknown = !(image.xres() > 0) || image.xres() == 1 || (is_png && image.xres() == default_of_png);
+  return is_unknown ? 0 : image.xres();
+}
+
+/// What libvips does not look for in the header of a JPEG 2000 file.
+void add_jp2_header(Picture& picture, const std::filesystem::path& file) {
+  std::string start(std::size_t{1} << 22, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
+  const auto header = read_jp2_header(std::string_view(start).substr(0, static_cast<std::size_t>(stream.gcount())));
+  picture.pixels_per_mm = header.pixels_per_mm;
+  picture.icc_profile = header.icc_profile;
+}
+
 Picture read_with_vips(const std::filesystem::path& file) {
-  VImage image = VImage::new_from_file(
-      file.c_str(), VImage::option()->set("access", VIPS_ACCESS_SEQUENTIAL)->set("fail_on", VIPS_FAIL_ON_TRUNCATED));
+  VImage image = open_image(file);
   const auto samples = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height()) *
                        static_cast<std::size_t>(image.bands());
   if (image.width() > widest_px || image.height() > widest_px || samples > most_samples)
@@ -110,8 +147,8 @@ Picture read_with_vips(const std::filesystem::path& file) {
   picture.icc_profile = blob_of(image, VIPS_META_ICC_NAME);
   for (const auto& kind : metadata_kinds)
     if (auto blob = blob_of(image, kind.vips_name); !blob.empty()) picture.metadata[kind.name] = std::move(blob);
-  const bool has_resolution = image.get_typeof(VIPS_META_RESOLUTION_UNIT) != 0;
-  if (has_resolution && image.xres() > 0) picture.pixels_per_mm = image.xres();
+  picture.pixels_per_mm = resolution_of(image);
+  if (std::string_view(image.get_string("vips-loader")) == "jp2kload") add_jp2_header(picture, file);
   image = to_gray_or_rgb(image, file);
   picture.channels = image.bands();
   if (image.format() == VIPS_FORMAT_UCHAR)
@@ -141,6 +178,7 @@ VImage to_vips(const Picture& picture) {
   for (const auto& [name, blob] : picture.metadata)
     for (const auto& kind : metadata_kinds)
       if (name == kind.name) set_blob(image, kind.vips_name, blob);
+  image.set(VIPS_META_ORIENTATION, 1);  // last: the EXIF blob may say otherwise of the scan
   return image;
 }
 
@@ -162,6 +200,15 @@ std::string lower_case_extension(const std::filesystem::path& file) {
   return extension;
 }
 
+std::string pack_jp2(const VImage& image) {
+  VipsBlob* const blob = image.jp2ksave_buffer(VImage::option()->set("lossless", true));
+  std::size_t size = 0;
+  const auto* data = static_cast<const char*>(vips_blob_get(blob, &size));
+  std::string bytes(data, size);
+  vips_area_unref(VIPS_AREA(blob));
+  return bytes;
+}
+
 void save(const VImage& image, const std::filesystem::path& file, const std::string& extension,
           const PictureFileOptions& options) {
   const char* name = file.c_str();
@@ -174,8 +221,6 @@ void save(const VImage& image, const std::filesystem::path& file, const std::str
                   ->set("compression", compression_of(options.tiff_compression))
                   ->set("predictor", packed ? VIPS_FOREIGN_TIFF_PREDICTOR_HORIZONTAL : VIPS_FOREIGN_TIFF_PREDICTOR_NONE)
                   ->set("resunit", VIPS_FOREIGN_TIFF_RESUNIT_INCH));
-  } else if (extension == ".jp2") {
-    image.jp2ksave(name, VImage::option()->set("lossless", true));
   } else {
     image.jpegsave(name, VImage::option()->set("Q", std::clamp(options.jpeg_quality, 1, 100)));
   }
@@ -204,13 +249,17 @@ void write_picture(const std::filesystem::path& file, const Picture& picture, co
     if (picture.bit_depth() == 16)
       throw cannot_write(file, "a JPEG holds 8 bit and the picture has 16: write PNG, TIFF or JPEG 2000");
   if (picture.width() == 0 || picture.height() == 0) throw std::invalid_argument("write_picture: the picture is empty");
-  AtomicFile output(file);
   try {
+    if (extension == ".jp2") {
+      write_bytes(file, complete_jp2_header(pack_jp2(to_vips(picture)), picture.pixels_per_mm, picture.icc_profile));
+      return;
+    }
+    AtomicFile output(file);
     save(to_vips(picture), output.temporary(), extension, options);
+    output.commit();
   } catch (const vips::VError& e) {
     throw cannot_write(file, message_of(e));
   }
-  output.commit();
 }
 
 }  // namespace pagesweep

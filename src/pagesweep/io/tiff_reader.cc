@@ -8,6 +8,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <stdexcept>
 #include <vector>
 
 namespace pagesweep {
@@ -19,6 +20,7 @@ constexpr std::uint64_t most_bytes = std::uint64_t{1} << 33;
 /// No codec of libtiff makes more of one byte: a header that promises more lies.
 constexpr std::uint64_t most_expansion = 3000;
 constexpr std::uint64_t always_plausible_bytes = 1 << 16;
+constexpr std::uint64_t always_plausible_block_bytes = 1 << 24;
 
 TiffReader::SampleFormat format_of(std::uint16_t tag) {
   switch (tag) {
@@ -33,13 +35,47 @@ TiffReader::SampleFormat format_of(std::uint16_t tag) {
   }
 }
 
-/// Strips are tiles as wide as the picture.
+/// How a TIFF cuts its picture into pieces that are packed one by one. Strips are blocks as wide as the picture; where
+/// channels are separate, each has blocks of its own.
 struct Blocks {
   bool tiled = false;
-  bool separate_channels = false;
-  std::uint32_t width = 0, height = 0;
-  std::size_t bytes = 0;
+  bool separate = false;
+  std::uint32_t width = 0, height = 0;  ///< [px]
+  std::size_t pixel_bytes = 0;          ///< in a block
 };
+
+/// A piece of the picture: its top left pixel, its size within the picture, its channel where they are separate.
+struct Piece {
+  std::uint32_t x = 0, y = 0, columns = 0, rows = 0;
+  std::uint16_t plane = 0;
+};
+
+/// Decodes one block. Tiles are always whole; the last strip ends with the picture.
+bool decode(TIFF* tiff, const Blocks& blocks, const Piece& piece, std::span<std::byte> block) {
+  const std::size_t rows = blocks.tiled ? blocks.height : piece.rows;
+  const auto bytes = static_cast<tmsize_t>(rows * blocks.width * blocks.pixel_bytes);
+  const tmsize_t got =
+      blocks.tiled
+          ? TIFFReadEncodedTile(tiff, TIFFComputeTile(tiff, piece.x, piece.y, 0, piece.plane), block.data(), bytes)
+          : TIFFReadEncodedStrip(tiff, TIFFComputeStrip(tiff, piece.y, piece.plane), block.data(), bytes);
+  return got >= bytes;
+}
+
+/// Copies what of a block lies in the picture to where it belongs.
+void place(const Blocks& blocks, const Piece& piece, std::span<const std::byte> block, std::span<std::byte> picture,
+           std::size_t picture_width, std::size_t picture_pixel_bytes) {
+  for (std::size_t y = 0; y < piece.rows; ++y) {
+    const std::byte* from = block.data() + y * blocks.width * blocks.pixel_bytes;
+    std::byte* to = picture.data() + ((piece.y + y) * picture_width + piece.x) * picture_pixel_bytes;
+    if (!blocks.separate) {
+      std::memcpy(to, from, piece.columns * blocks.pixel_bytes);
+      continue;
+    }
+    to += piece.plane * blocks.pixel_bytes;
+    for (std::size_t x = 0; x < piece.columns; ++x)
+      std::memcpy(to + x * picture_pixel_bytes, from + x * blocks.pixel_bytes, blocks.pixel_bytes);
+  }
+}
 
 }  // namespace
 
@@ -128,44 +164,30 @@ void TiffReader::read_samples(std::span<std::byte> out) {
 }
 
 void TiffReader::read_blocks(std::span<std::byte> out) {
-  TIFF* tiff = handle_->tiff;
   const auto width = static_cast<std::uint32_t>(layout_.width);
   const auto height = static_cast<std::uint32_t>(layout_.height);
-  Blocks blocks{TIFFIsTiled(tiff) != 0,
-                handle_->tag<std::uint16_t>(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == PLANARCONFIG_SEPARATE};
+  const auto channels = static_cast<std::uint16_t>(layout_.channels);
+  const auto sample_bytes = static_cast<std::size_t>(layout_.bits_per_sample / 8);
+  Blocks blocks;
+  blocks.tiled = TIFFIsTiled(handle_->tiff) != 0;
+  blocks.separate = handle_->tag<std::uint16_t>(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == PLANARCONFIG_SEPARATE;
   blocks.width = blocks.tiled ? handle_->tag<std::uint32_t>(TIFFTAG_TILEWIDTH, 0) : width;
   blocks.height = blocks.tiled ? handle_->tag<std::uint32_t>(TIFFTAG_TILELENGTH, 0)
                                : std::min(height, handle_->tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, height));
-  const auto sample_bytes = static_cast<std::size_t>(layout_.bits_per_sample / 8);
-  const auto channels = static_cast<std::size_t>(layout_.channels);
-  const std::size_t pixel_bytes = channels * sample_bytes;
-  const std::size_t block_pixel_bytes = blocks.separate_channels ? sample_bytes : pixel_bytes;
-  const std::uint64_t block_bytes = std::uint64_t{blocks.width} * blocks.height * block_pixel_bytes;
-  if (block_bytes == 0 || block_bytes > std::max<std::uint64_t>(std::uint64_t{1} << 24, 4 * out.size()))
+  blocks.pixel_bytes = blocks.separate ? sample_bytes : channels * sample_bytes;
+  const std::uint64_t most_block_bytes = std::max<std::uint64_t>(always_plausible_block_bytes, 4 * out.size());
+  if (blocks.width == 0 || blocks.height == 0 ||
+      std::uint64_t{blocks.width} * blocks.height > most_block_bytes / blocks.pixel_bytes)
     throw error(fmt::format("its tiles of {} x {} pixels make no sense", blocks.width, blocks.height));
 
-  std::vector<std::byte> block(block_bytes);
-  for (std::uint16_t plane = 0; plane < (blocks.separate_channels ? channels : 1); ++plane)
-    for (std::uint32_t y0 = 0; y0 < height; y0 += blocks.height)
-      for (std::uint32_t x0 = 0; x0 < width; x0 += blocks.width) {
-        const std::uint32_t rows = std::min(blocks.height, height - y0);
-        const std::uint32_t columns = std::min(blocks.width, width - x0);
-        const auto needed = static_cast<tmsize_t>((blocks.tiled ? blocks.height : rows) * std::size_t{blocks.width} *
-                                                  block_pixel_bytes);
-        const tmsize_t got =
-            blocks.tiled ? TIFFReadEncodedTile(tiff, TIFFComputeTile(tiff, x0, y0, 0, plane), block.data(), needed)
-                         : TIFFReadEncodedStrip(tiff, TIFFComputeStrip(tiff, y0, plane), block.data(), needed);
-        if (got < needed) throw error(fmt::format("it is cut short or corrupt at row {}", y0));
-        for (std::uint32_t y = 0; y < rows; ++y) {
-          const std::byte* from = block.data() + y * std::size_t{blocks.width} * block_pixel_bytes;
-          std::byte* to = out.data() + ((y0 + y) * std::size_t{width} + x0) * pixel_bytes + plane * sample_bytes;
-          if (!blocks.separate_channels) {
-            std::memcpy(to, from, columns * pixel_bytes);
-            continue;
-          }
-          for (std::uint32_t x = 0; x < columns; ++x)
-            std::memcpy(to + x * pixel_bytes, from + x * sample_bytes, sample_bytes);
-        }
+  std::vector<std::byte> block(std::size_t{blocks.width} * blocks.height * blocks.pixel_bytes);
+  for (std::uint16_t plane = 0; plane < (blocks.separate ? channels : 1); ++plane)
+    for (std::uint32_t y = 0; y < height; y += blocks.height)
+      for (std::uint32_t x = 0; x < width; x += blocks.width) {
+        const Piece piece{x, y, std::min(blocks.width, width - x), std::min(blocks.height, height - y), plane};
+        if (!decode(handle_->tiff, blocks, piece, block))
+          throw error(fmt::format("it is cut short or corrupt at row {}", y));
+        place(blocks, piece, block, out, width, channels * sample_bytes);
       }
 }
 
