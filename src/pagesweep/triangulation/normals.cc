@@ -2,8 +2,11 @@
 #include "pagesweep/triangulation/normals.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -12,112 +15,137 @@
 namespace pagesweep {
 namespace {
 
-/// A neighbour: its direction from the middle pixel's, and its inverse depth over the middle pixel's, less 1.
-struct Sample {
-  float dx, dy, depth;
+/// A plane as one camera sees it around a pixel: relative inverse depth = across i + down j + middle, at i columns to
+/// the right and j rows down.
+struct SeenPlane {
+  float across = 0, down = 0, middle = 0;
+  float at(float i, float j) const { return across * i + down * j + middle; }
 };
 
-/// depth = m . (dx, dy, 1) by least squares over the samples that miss `first` by at most `limit`.
-std::optional<Eigen::Vector3f> fit_plane(const std::vector<Sample>& samples, const Eigen::Vector3f& first,
-                                         float limit) {
-  Eigen::Matrix3f normal_matrix = Eigen::Matrix3f::Zero();
-  Eigen::Vector3f right = Eigen::Vector3f::Zero();
-  int count = 0;
-  float xx = 0, xy = 0, yy = 0, x = 0, y = 0, xd = 0, yd = 0, d = 0;
-  for (const Sample& s : samples) {
-    const float use = std::abs(s.depth - (first.x() * s.dx + first.y() * s.dy + first.z())) <= limit ? 1.0f : 0.0f;
-    count += static_cast<int>(use);
-    xx += use * s.dx * s.dx;
-    xy += use * s.dx * s.dy;
-    yy += use * s.dy * s.dy;
-    x += use * s.dx;
-    y += use * s.dy;
-    xd += use * s.dx * s.depth;
-    yd += use * s.dy * s.depth;
-    d += use * s.depth;
-  }
-  if (count < 6) return std::nullopt;
-  normal_matrix << xx, xy, x, xy, yy, y, x, y, static_cast<float>(count);
-  right << xd, yd, d;
-  const Eigen::LDLT<Eigen::Matrix3f> solver(normal_matrix);
-  const Eigen::Vector3f pivots = solver.vectorD();
-  if (!(pivots.minCoeff() > 1e-4f)) return std::nullopt;  // [px^2] the samples lie on a line
-  return solver.solve(right);
-}
-
-/// The neighbours of one pixel that have a point; directions in pixels, so that the fit is well scaled.
+/// The points around one pixel.
 class Neighbourhood {
  public:
-  Neighbourhood(const Image<float>& inverse_depth, const Camera& camera, const RayTable& rays, int radius)
-      : inverse_depth_(inverse_depth), rays_(rays), focal_px_(camera.fx), radius_(radius) {}
-
-  /// Normal in the camera's frame.
-  std::optional<Eigen::Vector3d> normal_at(int x, int y) {
-    gather(x, y);
-    auto plane = fit_plane(samples_, Eigen::Vector3f::Zero(), std::numeric_limits<float>::infinity());
-    if (!plane) return std::nullopt;
-    misses_.clear();
-    for (const Sample& s : samples_)
-      misses_.push_back(std::abs(s.depth - (plane->x() * s.dx + plane->y() * s.dy + plane->z())));
-    const auto middle = misses_.begin() + static_cast<std::ptrdiff_t>(misses_.size() / 2);
-    std::nth_element(misses_.begin(), middle, misses_.end());
-    const float median = *middle;
-    const bool outliers = std::any_of(middle, misses_.end(), [&](float miss) { return miss > 3 * median; });
-    if (outliers) plane = fit_plane(samples_, *plane, 3 * median);
-    if (!plane) return std::nullopt;
-    // depth = mx dx + my dy + mz with (dx, dy) = f (direction - here): back to m . (X/Z, Y/Z, 1) = 1/Z.
-    const Eigen::Vector2d here = rays_.direction(x, y);
-    const Eigen::Vector2d slope = focal_px_ * plane->head<2>().cast<double>();
-    const Eigen::Vector3d m(slope.x(), slope.y(), 1 + plane->z() - slope.dot(here));
-    return Eigen::Vector3d(-m.normalized());
-  }
-
- private:
-  void gather(int x, int y) {
-    samples_.clear();
-    const float here = inverse_depth_(x, y);
-    const Eigen::Vector2d direction = rays_.direction(x, y);
-    const int top = std::max(0, y - radius_), bottom = std::min(inverse_depth_.height() - 1, y + radius_);
-    const int left = std::max(0, x - radius_), right = std::min(inverse_depth_.width() - 1, x + radius_);
+  /// Of pixel (x, y), the middle one included; inverse depths are taken over the middle one's, less 1.
+  void gather(const Image<float>& inverse_depth, int x, int y, int radius) {
+    i_.clear();
+    j_.clear();
+    depth_.clear();
+    const float scale = 1 / inverse_depth(x, y);
+    const int top = std::max(0, y - radius), bottom = std::min(inverse_depth.height() - 1, y + radius);
+    const int left = std::max(0, x - radius), right = std::min(inverse_depth.width() - 1, x + radius);
     for (int row = top; row <= bottom; ++row)
       for (int column = left; column <= right; ++column) {
-        const float depth = inverse_depth_(column, row);
+        const float depth = inverse_depth(column, row);
         if (std::isnan(depth)) continue;
-        const Eigen::Vector2f offset = (focal_px_ * (rays_.direction(column, row) - direction)).cast<float>();
-        samples_.push_back({offset.x(), offset.y(), depth / here - 1});
+        i_.push_back(static_cast<float>(column - x));
+        j_.push_back(static_cast<float>(row - y));
+        depth_.push_back(depth * scale - 1);
       }
   }
 
-  const Image<float>& inverse_depth_;
-  const RayTable& rays_;
-  double focal_px_;
-  int radius_;
-  std::vector<Sample> samples_;
-  std::vector<float> misses_;
+  std::size_t size() const { return depth_.size(); }
+
+  /// Least squares over the points that miss `before` by at most `limit`; nothing if they are few or on a line.
+  std::optional<SeenPlane> fit(const SeenPlane& before, float limit) const;
+
+  /// Median of the distances from a plane, and whether any of them is more than three times as much.
+  std::pair<float, bool> median_miss(const SeenPlane& plane) {
+    misses_.clear();
+    for (std::size_t k = 0; k < size(); ++k) misses_.push_back(std::abs(depth_[k] - plane.at(i_[k], j_[k])));
+    const auto middle = misses_.begin() + static_cast<std::ptrdiff_t>(misses_.size() / 2);
+    std::nth_element(misses_.begin(), middle, misses_.end());
+    return {*middle, *std::max_element(middle, misses_.end()) > 3 * *middle};
+  }
+
+ private:
+  std::vector<float> i_, j_, depth_, misses_;
 };
+
+std::optional<SeenPlane> Neighbourhood::fit(const SeenPlane& before, float limit) const {
+  float n = 0, i = 0, j = 0, ii = 0, ij = 0, jj = 0, d = 0, id = 0, jd = 0;
+  for (std::size_t k = 0; k < size(); ++k) {
+    const float use = std::abs(depth_[k] - before.at(i_[k], j_[k])) <= limit ? 1.0f : 0.0f;
+    const float ui = use * i_[k], uj = use * j_[k];
+    n += use;
+    i += ui;
+    j += uj;
+    ii += ui * i_[k];
+    ij += ui * j_[k];
+    jj += uj * j_[k];
+    d += use * depth_[k];
+    id += ui * depth_[k];
+    jd += uj * depth_[k];
+  }
+  if (n < 6) return std::nullopt;
+  // About the centroid, the two slopes are a 2 x 2 system.
+  const float cii = ii - i * i / n, cij = ij - i * j / n, cjj = jj - j * j / n;
+  const float cid = id - i * d / n, cjd = jd - j * d / n;
+  const float determinant = cii * cjj - cij * cij;
+  if (!(determinant > 1e-3f * n * n)) return std::nullopt;
+  const float across = (cid * cjj - cjd * cij) / determinant, down = (cjd * cii - cid * cij) / determinant;
+  return SeenPlane{across, down, (d - across * i - down * j) / n};
+}
+
+/// The normal of a plane seen around pixel (x, y), in the camera's frame and towards it.
+Eigen::Vector3f normal_of(const SeenPlane& plane, const RayTable& rays, int x, int y) {
+  const int right = std::min(x + 1, rays.width() - 1), left = std::max(x - 1, 0);
+  const int bottom = std::min(y + 1, rays.height() - 1), top = std::max(y - 1, 0);
+  Eigen::Matrix2d direction_by_pixel;
+  direction_by_pixel << (rays.direction(right, y) - rays.direction(left, y)) / (right - left),
+      (rays.direction(x, bottom) - rays.direction(x, top)) / (bottom - top);
+  // Slopes by pixel are slopes by direction times that matrix.
+  const Eigen::Vector2d slope = direction_by_pixel.transpose().inverse() * Eigen::Vector2d(plane.across, plane.down);
+  const double here = 1 + plane.middle - slope.dot(rays.direction(x, y));
+  return -Eigen::Vector3d(slope.x(), slope.y(), here).normalized().cast<float>();
+}
+
+Image<float> inverse_depths(const PointMap& points, const Camera& camera) {
+  Image<float> inverse_depth(points.width(), points.height(), not_a_number);
+  const Eigen::Vector3d axis = camera.cam_from_rig.rotation.row(2);
+  const double offset = camera.cam_from_rig.translation.z();
+  parallel_rows(points.height(), [&](int y) {
+    for (int x = 0; x < points.width(); ++x) {
+      if (points.status(x, y) != PixelStatus::ok) continue;
+      const Eigen::Vector3d point(points.x(x, y), points.y(x, y), points.z(x, y));
+      inverse_depth(x, y) = static_cast<float>(1 / (axis.dot(point) + offset));
+    }
+  });
+  return inverse_depth;
+}
+
+void reject(PointMap& points, int x, int y) {
+  points.x(x, y) = points.y(x, y) = points.z(x, y) = points.sigma(x, y) = not_a_number;
+  points.status(x, y) = PixelStatus::off_surface;
+}
 
 }  // namespace
 
-void estimate_normals(PointMap& points, const Camera& camera, const RayTable& rays, int radius_px) {
-  Image<float> inverse_depth(points.width(), points.height(), not_a_number);
-  const Eigen::Vector3f axis = camera.cam_from_rig.rotation.row(2).cast<float>();
-  const auto offset = static_cast<float>(camera.cam_from_rig.translation.z());
+void fit_normals(PointMap& points, const Camera& camera, const RayTable& rays, int radius_px) {
+  const Image<float> inverse_depth = inverse_depths(points, camera);
+  const Eigen::Matrix3f rig_from_cam = camera.cam_from_rig.rotation.transpose().cast<float>();
+  constexpr float everything = std::numeric_limits<float>::infinity();
   parallel_rows(points.height(), [&](int y) {
-    for (int x = 0; x < points.width(); ++x)
-      if (points.status(x, y) == PixelStatus::ok)
-        inverse_depth(x, y) = 1 / (axis.dot(Eigen::Vector3f(points.x(x, y), points.y(x, y), points.z(x, y))) + offset);
-  });
-  const Eigen::Matrix3d rig_from_cam = camera.cam_from_rig.rotation.transpose();
-  parallel_rows(points.height(), [&](int y) {
-    Neighbourhood neighbourhood(inverse_depth, camera, rays, radius_px);
+    Neighbourhood around;
     for (int x = 0; x < points.width(); ++x) {
       if (points.status(x, y) != PixelStatus::ok) continue;
-      const auto normal = neighbourhood.normal_at(x, y);
-      if (!normal) continue;
-      const Eigen::Vector3f in_rig = (rig_from_cam * *normal).cast<float>();
-      points.nx(x, y) = in_rig.x();
-      points.ny(x, y) = in_rig.y();
-      points.nz(x, y) = in_rig.z();
+      around.gather(inverse_depth, x, y, radius_px);
+      auto plane = around.fit({}, everything);
+      if (!plane) {
+        if (around.size() < 7) reject(points, x, y);
+        continue;
+      }
+      const auto [median, has_outliers] = around.median_miss(*plane);
+      if (has_outliers) plane = around.fit(*plane, 3 * median);
+      if (!plane) continue;
+      const float relative_sigma = points.sigma(x, y) * inverse_depth(x, y);
+      if (std::abs(plane->middle) > 6 * std::max(relative_sigma, median)) {
+        reject(points, x, y);
+        continue;
+      }
+      const Eigen::Vector3f normal = rig_from_cam * normal_of(*plane, rays, x, y);
+      points.nx(x, y) = normal.x();
+      points.ny(x, y) = normal.y();
+      points.nz(x, y) = normal.z();
     }
   });
 }

@@ -7,11 +7,14 @@
 
 namespace pagesweep {
 
-/// Fills in the normals, towards the camera, of all points that have status ok and enough neighbours.
+/// Fits a plane to the neighbourhood of every point: fills in the normals, towards the camera, and marks as off_surface
+/// the points that stand alone or away from what surrounds them.
 ///
-/// A plane m . X = 1 in the camera's frame is seen at inverse depth 1/Z = m . (X/Z, Y/Z, 1): linear, so m is the least
-/// squares fit of inverse depth to the viewing directions of the (2 radius_px + 1)^2 pixels around. Neighbours that
-/// miss the plane by more than three times the median do not count in a second fit: another surface behind an edge.
-void estimate_normals(PointMap& points, const Camera& camera, const RayTable& rays, int radius_px);
+/// A plane m . X = 1 in the camera's frame is seen at inverse depth 1/Z = m . (X/Z, Y/Z, 1), which over a few pixels is
+/// linear in column and row: a least squares fit to the (2 radius_px + 1)^2 pixels around. Neighbours that miss it by
+/// more than three times the median do not count in a second fit: another surface behind an edge. A point is off the
+/// surface if fewer than six neighbours have points, or if it misses the plane by more than six of its own standard
+/// deviations and six times the median.
+void fit_normals(PointMap& points, const Camera& camera, const RayTable& rays, int radius_px);
 
 }  // namespace pagesweep

@@ -62,7 +62,7 @@ PointMap section_light(const TimeMap& times, const Camera& camera, const Light& 
           static_cast<float>(times.sigma(x, y) * std::abs(sliding_speed(light, ray, times.time(x, y))));
     }
   });
-  estimate_normals(points, camera, rays, options.normal_radius_px);
+  fit_normals(points, camera, rays, options.normal_radius_px);
   return points;
 }
 

@@ -94,7 +94,7 @@ PointMap triangulate(const Correspondences& matches, const Image<float>& intensi
   parallel_rows(from.height, [&](int y) {
     for (int x = 0; x < from.width; ++x) triangulator.put(matches, x, y, points);
   });
-  estimate_normals(points, from, from_rays, options.normal_radius_px);
+  fit_normals(points, from, from_rays, options.normal_radius_px);
   return points;
 }
 
