@@ -19,7 +19,7 @@ struct DewarpOptions {
   bool deskew = true;
   bool crop = true;
   double margin_mm = 0;
-  ResampleOptions resampling;
+  ResampleOptions resampling{};
 
   template <class Visitor>
   void describe(Visitor&& visit) {

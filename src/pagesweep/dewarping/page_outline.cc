@@ -68,19 +68,21 @@ double paper_brightness(const FlatPreview& preview, const Image<float>& closed) 
   return quantile(measured.empty() ? all : measured, 0.85);
 }
 
-/// The table at one side: the typical brightness of the outermost 2 mm, as far as that is darker than paper; nothing
-/// if paper, or nothing at all, is seen there.
+/// The table at one side: the typical brightness of the outermost 2 mm that the scan shows, as far as that is darker
+/// than paper; nothing if paper, or nothing at all, is seen there.
 std::optional<double> table_brightness(const SideOfPreview& side, const Image<float>& closed, double paper) {
+  constexpr int rim = 4;  // cells
   std::vector<float> dark;
   std::size_t seen = 0;
   for (int line = 0; line < side.lines(); ++line)
-    for (int deep = 0; deep < std::min(4, side.depth()); ++deep) {
+    for (int deep = 0, in_rim = 0; deep < side.depth() && in_rim < rim; ++deep) {
       if (std::isnan(side.at(side.preview.brightness, line, deep))) continue;
+      ++in_rim;
       ++seen;
       const float brightness = side.at(closed, line, deep);
       if (brightness < (1 - least_contrast) * paper) dark.push_back(brightness);
     }
-  if (dark.size() < 16 || dark.size() < 0.2 * double(seen)) return std::nullopt;
+  if (dark.size() < 16 || double(dark.size()) < 0.2 * double(seen)) return std::nullopt;
   return quantile(dark, 0.5);
 }
 

@@ -163,8 +163,8 @@ inline std::vector<std::pair<std::string, Scanner>> make_small_scanners(double p
   camera.cam_from_rig = {down, {0, 0, distance}};
   const Pushbroom pushbroom{
       width, height, f, cx, -0.02, down, {0, cy / pixels_per_mm, distance}, {0, -1 / pixels_per_mm, 0}};
-  const double angle_step = -1 / f;
-  const RotatingLine rotating{width, height, f, cx, -0.02, down, {0, 0, distance}, -cy * angle_step * -1, angle_step};
+  const double angle_step = 1 / f;
+  const RotatingLine rotating{width, height, f, cx, -0.02, down, {0, 0, distance}, -cy * angle_step, angle_step};
   return {{"frame_camera", Scanner(camera)}, {"pushbroom", Scanner(pushbroom)}, {"rotating_line", Scanner(rotating)}};
 }
 
@@ -177,16 +177,21 @@ inline Picture render_scan(const Sheet& sheet, const Scanner& scanner,
                            int channels = 1, int bit_depth = 8) {
   Picture scan = make_picture(scanner.width(), scanner.height(), channels, bit_depth);
   const auto image = [&](const Eigen::Vector2d& at) { return *scanner.project(sheet(at.x(), at.y())); };
+  const auto jacobian = [&](const Eigen::Vector2d& at) {
+    const double h = 1e-3;
+    const Eigen::Vector2d along_s(h, 0), along_t(0, h);
+    Eigen::Matrix2d pixel_by_paper;
+    pixel_by_paper << (image(at + along_s) - image(at - along_s)) / (2 * h),
+        (image(at + along_t) - image(at - along_t)) / (2 * h);
+    return pixel_by_paper;
+  };
   parallel_rows(scanner.height(), [&](int y) {
     Eigen::Vector2d paper = Eigen::Vector2d::Zero();
     for (int x = 0; x < scanner.width(); ++x) {
       Eigen::Matrix2d paper_by_pixel = Eigen::Matrix2d::Zero();
-      for (int i = 0; i < (x == 0 ? 30 : 4); ++i) {
-        const double h = 1e-3;
-        Eigen::Matrix2d jacobian;
-        jacobian << (image(paper + Eigen::Vector2d(h, 0)) - image(paper - Eigen::Vector2d(h, 0))) / (2 * h),
-            (image(paper + Eigen::Vector2d(0, h)) - image(paper - Eigen::Vector2d(0, h))) / (2 * h);
-        paper_by_pixel = jacobian.inverse();
+      // From the neighbour's spot one derivative serves for two steps.
+      for (int i = 0; i < (x == 0 ? 30 : 2); ++i) {
+        if (x == 0 || i == 0) paper_by_pixel = jacobian(paper).inverse();
         paper -= paper_by_pixel * (image(paper) - Eigen::Vector2d(x, y));
       }
       double sum = 0;
