@@ -1,25 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/sim/analytic_scene.h"
 
-#include <Eigen/Geometry>
 #include <cmath>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/sim/viewpoint.h"
 
 namespace pagesweep::sim {
 namespace {
-
-/// A camera at `center` that looks at `target`, with the picture's columns along rig x.
-Rigid3 looking_at(const Eigen::Vector3d& center, const Eigen::Vector3d& target) {
-  const Eigen::Vector3d forward = (target - center).normalized();
-  const Eigen::Vector3d down = forward.cross(Eigen::Vector3d::UnitX()).normalized();
-  Rigid3 cam_from_rig;
-  cam_from_rig.rotation.row(0) = down.cross(forward);
-  cam_from_rig.rotation.row(1) = down;
-  cam_from_rig.rotation.row(2) = forward;
-  cam_from_rig.translation = -cam_from_rig.rotation * center;
-  return cam_from_rig;
-}
 
 /// Calls use(x, y, point) for every pixel of the camera that sees the surface.
 template <class Use>

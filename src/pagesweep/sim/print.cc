@@ -48,9 +48,11 @@ class Press {
   void print_footer() {
     if (design_.footer.empty()) return;
     const auto layout = make_layout(design_.footer, design_.font_size_pt, false);
-    pango_layout_set_alignment(layout.get(), PANGO_ALIGN_CENTER);
-    const double y = design_.height_mm - 0.55 * design_.margin_bottom_mm;
-    show_line(pango_layout_get_line_readonly(layout.get(), 0), left() + line_offset_mm(layout.get()), y);
+    PangoLayoutLine* line = pango_layout_get_line_readonly(layout.get(), 0);
+    PangoRectangle extents;
+    pango_layout_line_get_extents(line, nullptr, &extents);
+    const double middle = 0.5 * (design_.margin_left_mm + design_.width_mm - design_.margin_right_mm);
+    show_line(line, middle - 0.5 * extents.width / PANGO_SCALE, design_.height_mm - 0.55 * design_.margin_bottom_mm);
     append(design_.footer);
   }
 
@@ -128,11 +130,6 @@ class Press {
     pango_layout_set_text(layout.get(), text.c_str(), static_cast<int>(text.size()));
     return layout;
   }
-  static double line_offset_mm(PangoLayout* layout) {
-    PangoRectangle extents;
-    pango_layout_line_get_extents(pango_layout_get_line_readonly(layout, 0), nullptr, &extents);
-    return 0.5 * (pango_layout_get_width(layout) - extents.width) / PANGO_SCALE;
-  }
 
   void show_line(PangoLayoutLine* line, double x_mm, double baseline_mm) {
     cairo_move_to(cairo_.get(), x_mm, baseline_mm);
@@ -194,7 +191,8 @@ class Press {
     const double from_sun = std::hypot((x - 0.72) * 1.4, y - 0.24);
     double tone = from_sun < 0.09 ? 1 : sky + 0.1 * std::exp(-8 * from_sun);
     for (int range = 0; range < 3; ++range) {
-      const double ridge = 0.42 + 0.17 * range + 0.06 * std::sin(2 * std::numbers::pi * (1.3 + range) * x + 1.7 * range) +
+      const double ridge = 0.42 + 0.17 * range +
+                           0.06 * std::sin(2 * std::numbers::pi * (1.3 + range) * x + 1.7 * range) +
                            0.015 * std::sin(31 * x * (1 + 0.3 * range));
       if (y > ridge) tone = 0.5 - 0.17 * range + 0.12 * std::sin(40 * (y - ridge)) * (y - ridge);
     }

@@ -21,7 +21,7 @@ constexpr auto names_of(FigureKind) { return std::array<std::string_view, 3>{"ru
 /// A figure across the sheet's columns; text keeps clear of it.
 struct Figure {
   FigureKind kind = FigureKind::ruled;
-  double x_mm = 0, y_mm = 0;           ///< top left corner on the sheet
+  double x_mm = 0, y_mm = 0;  ///< top left corner on the sheet
   double width_mm = 0, height_mm = 0;
 };
 
@@ -32,10 +32,10 @@ struct PrintDesign {
   double ink_albedo = 0.05;
   std::vector<std::string> texts;  ///< one after the other
   double font_size_pt = 12;
-  double line_spacing = 1.3;   ///< in units of the font's own
+  double line_spacing = 1.3;  ///< in units of the font's own
   double margin_left_mm = 20, margin_right_mm = 20, margin_top_mm = 20, margin_bottom_mm = 22;
   int columns = 1;
-  std::string footer;          ///< at the middle of the lower margin: the page number
+  std::string footer;  ///< at the middle of the lower margin: the page number
   std::vector<Figure> figures;
 };
 

@@ -11,7 +11,8 @@ namespace pagesweep::sim {
 /// whose footprint is larger than a texel.
 class Texture {
  public:
-  explicit Texture(float albedo = 0) : constant_(albedo) {}
+  Texture() = default;
+  explicit Texture(float albedo) : constant_(albedo) {}
   /// \param albedo  texel (i, j) is centred at s = (i + 0.5) / texels_per_mm, t = (j + 0.5) / texels_per_mm
   Texture(Image<float> albedo, double texels_per_mm);
 

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/sim/render_camera.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numbers>
+#include <type_traits>
+
+#include "pagesweep/base/parallel.h"
+#include "pagesweep/data/time_map.h"
+
+namespace pagesweep::sim {
+namespace {
+
+/// Integral of the standard normal distribution's cumulative function.
+double cumulated_twice(double z) {
+  const double cumulative = 0.5 * std::erfc(-z * std::numbers::sqrt2 / 2);
+  return z * cumulative + std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi);
+}
+
+/// One ray of a pixel's bundle.
+struct SpotSample {
+  Eigen::Vector2d offset_px;
+  double spacing_px;  ///< to its neighbours: the square root of its share of the picture
+};
+
+std::vector<SpotSample> spot_samples(int per_side, double psf_sigma_px) {
+  const std::vector<double> offsets = spot_offsets(per_side, psf_sigma_px);
+  const auto spacing = [&](int k) {
+    const int before = std::max(k - 1, 0), after = std::min(k + 1, per_side - 1);
+    if (before == after) return 1.0;
+    return (offsets[std::size_t(after)] - offsets[std::size_t(before)]) / (after - before);
+  };
+  std::vector<SpotSample> samples;
+  for (int j = 0; j < per_side; ++j)
+    for (int i = 0; i < per_side; ++i)
+      samples.push_back({{offsets[std::size_t(i)], offsets[std::size_t(j)]}, std::sqrt(spacing(i) * spacing(j))});
+  return samples;
+}
+
+/// Light of one surface within a pixel that is the same for all of the spot: it arrives from everywhere.
+struct SurfaceShare {
+  int surface = -1;
+  float albedo = 0, s = 0, t = 0, rays = 0;  ///< sums over the rays that hit the surface
+};
+
+class CameraRenderer {
+ public:
+  CameraRenderer(const LitWorld& lit, const Camera& camera, int viewer, const CameraOptions& options)
+      : lit_(lit),
+        camera_(camera),
+        viewer_(viewer),
+        options_(options),
+        rig_from_cam_(camera.cam_from_rig.inverse()),
+        samples_(spot_samples(options.rays_per_side, options.psf_sigma_px)) {
+    const double mm_per_px = rig_from_cam_.translation.z() / camera.fx;
+    for (const Surface& surface : lit.world.surfaces)
+      for (const SpotSample& sample : samples_)
+        levels_.push_back(surface.albedo.level_for(sample.spacing_px * mm_per_px));
+  }
+
+  struct Scratch {
+    std::vector<SimRay> rays;
+    std::vector<SimHit> hits;
+  };
+
+  /// Light on a pixel at each frame; 1 fills the full well.
+  void expose_pixel(int x, int y, Scratch& scratch, std::span<float> frames) const {
+    std::ranges::fill(frames, 0.0f);
+    if (!aim(x, y, scratch.rays)) return;
+    scratch.hits.resize(scratch.rays.size());
+    lit_.caster.cast(scratch.rays, scratch.hits);
+    std::array<SurfaceShare, 4> shares;  // a pixel that shows more surfaces than this loses the glow on the rest
+    const float share_of_ray = static_cast<float>(options_.exposure) / static_cast<float>(samples_.size());
+    for (std::size_t k = 0; k < samples_.size(); ++k) {
+      const SimHit& hit = scratch.hits[k];
+      if (hit.surface < 0) continue;
+      const auto number = static_cast<std::size_t>(hit.surface);
+      const Surface& surface = lit_.world.surfaces[number];
+      const NodeLight light = light_at(lit_.direct[number], hit.spot);
+      const Eigen::Vector2f st = surface.mesh.parameters(hit.spot);
+      const float albedo = surface.albedo.at(st.x(), st.y(), levels_[number * samples_.size() + k]);
+      sweep(light, share_of_ray * (albedo * light.diffuse + light.gloss[viewer_]), frames);
+      collect(hit.surface, albedo, st, shares);
+    }
+    for (const SurfaceShare& share : shares) {
+      if (share.rays == 0) continue;
+      const float weight = share_of_ray * share.albedo;
+      lit_.bounce.add(share.surface, share.s / share.rays, share.t / share.rays, weight, frames);
+      for (float& frame : frames) frame += weight * static_cast<float>(options_.ambient);
+    }
+  }
+
+ private:
+  /// The bundle of rays of a pixel. Within its few pixels the distortion is linear to 1e-4 px.
+  bool aim(int x, int y, std::vector<SimRay>& rays) const {
+    const Eigen::Vector2d image((x - camera_.cx) / camera_.fx, (y - camera_.cy) / camera_.fy);
+    const auto ideal = camera_.distortion.undistort(image);
+    if (!ideal) return false;
+    const Eigen::Matrix2d ideal_by_image = camera_.distortion.jacobian(*ideal).inverse();
+    rays.clear();
+    for (const SpotSample& sample : samples_) {
+      const Eigen::Vector2d offset(sample.offset_px.x() / camera_.fx, sample.offset_px.y() / camera_.fy);
+      const Eigen::Vector2d direction = *ideal + ideal_by_image * offset;
+      rays.push_back({rig_from_cam_.translation.cast<float>(),
+                      (rig_from_cam_.rotation * Eigen::Vector3d(direction.x(), direction.y(), 1)).cast<float>()});
+    }
+    return true;
+  }
+
+  /// The stripe passes a spot.
+  void sweep(const NodeLight& light, float weight, std::span<float> frames) const {
+    if (weight <= 0) return;
+    const float reach = static_cast<float>(lit_.stripe.last_mm()) / light.speed;
+    const int first = std::max(0, static_cast<int>(std::ceil(light.time - reach)));
+    const int last = std::min(static_cast<int>(frames.size()) - 1, static_cast<int>(std::floor(light.time + reach)));
+    for (int i = first; i <= last; ++i)
+      frames[std::size_t(i)] += weight * lit_.stripe.light((static_cast<float>(i) - light.time) * light.speed);
+  }
+
+  static void collect(int surface, float albedo, const Eigen::Vector2f& st, std::span<SurfaceShare> shares) {
+    for (SurfaceShare& share : shares) {
+      if (share.surface != surface && share.rays > 0) continue;
+      share.surface = surface;
+      share.albedo += albedo;
+      share.s += st.x();
+      share.t += st.y();
+      share.rays += 1;
+      return;
+    }
+  }
+
+  const LitWorld& lit_;
+  const Camera& camera_;
+  int viewer_;
+  const CameraOptions& options_;
+  Rigid3 rig_from_cam_;
+  std::vector<SpotSample> samples_;
+  std::vector<int> levels_;  ///< of the texture, by surface and sample
+};
+
+template <class Pixel>
+std::vector<Image<Pixel>> render(const CameraRenderer& renderer, const Camera& camera, const SensorModel& sensor,
+                                 int frames, const CounterRandom& noise, Progress& progress) {
+  std::vector<Image<Pixel>> images;
+  for (int i = 0; i < frames; ++i) images.emplace_back(camera.width, camera.height);
+  const int band = 32;  // rows between two reports of progress
+  for (int begin = 0; begin < camera.height; begin += band) {
+    parallel_rows(std::min(band, camera.height - begin), [&](int row) {
+      const int y = begin + row;
+      CameraRenderer::Scratch scratch;
+      std::vector<float> light(static_cast<std::size_t>(frames));
+      Image<Pixel> gray(camera.width, frames);
+      for (int x = 0; x < camera.width; ++x) {
+        renderer.expose_pixel(x, y, scratch, light);
+        const auto first = (std::uint64_t(y) * std::uint64_t(camera.width) + std::uint64_t(x)) * std::uint64_t(frames);
+        for (int i = 0; i < frames; ++i)
+          gray(x, i) = static_cast<Pixel>(
+              expose(sensor, static_cast<double>(light[std::size_t(i)]), noise, first + std::uint64_t(i)));
+      }
+      for (int i = 0; i < frames; ++i) std::ranges::copy(gray.row(i), images[std::size_t(i)].row(y).begin());
+    });
+    progress.advance(std::min(1.0, double(begin + band) / camera.height));
+  }
+  return images;
+}
+
+}  // namespace
+
+std::vector<double> spot_offsets(int count, double psf_sigma_px) {
+  const double sigma = std::max(psf_sigma_px, 1e-3);
+  const auto cumulative = [&](double x) {
+    return sigma * (cumulated_twice((x + 0.5) / sigma) - cumulated_twice((x - 0.5) / sigma));
+  };
+  std::vector<double> offsets;
+  for (int k = 0; k < count; ++k) {
+    double low = -0.5 - 8 * sigma, high = 0.5 + 8 * sigma;
+    for (int i = 0; i < 60; ++i) {
+      const double middle = 0.5 * (low + high);
+      (cumulative(middle) < (k + 0.5) / count ? low : high) = middle;
+    }
+    offsets.push_back(0.5 * (low + high));
+  }
+  return offsets;
+}
+
+Frames render_camera(const LitWorld& lit, const Camera& camera, int viewer, const CameraOptions& options,
+                     const SensorModel& sensor, std::uint64_t seed, Progress& progress) {
+  progress.begin("rendering " + camera.name);
+  const CameraRenderer renderer(lit, camera, viewer, options);
+  const CounterRandom noise(seed, static_cast<std::uint64_t>(viewer));
+  Frames frames({camera.name, camera.width, camera.height, options.frames, sensor.bit_depth, sensor.black_level,
+                 sensor.highest()});
+  const auto take = [&](auto images) {
+    for (int i = 0; i < options.frames; ++i) frames.set(i, std::move(images[std::size_t(i)]));
+  };
+  if (sensor.bit_depth <= 8)
+    take(render<std::uint8_t>(renderer, camera, sensor, options.frames, noise, progress));
+  else
+    take(render<std::uint16_t>(renderer, camera, sensor, options.frames, noise, progress));
+  return frames;
+}
+
+Image<Eigen::Vector3f> find_camera_points(const World& world, const RayCaster& caster, const Camera& camera) {
+  Image<Eigen::Vector3f> points(camera.width, camera.height, Eigen::Vector3f::Constant(not_a_number));
+  parallel_rows(camera.height, [&](int y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const auto ray = camera.ray({double(x), double(y)});
+      if (!ray) continue;
+      const SimHit hit = caster.cast({ray->origin.cast<float>(), ray->direction.cast<float>()});
+      if (hit.surface < 0 || !world.surfaces[std::size_t(hit.surface)].is_measured) continue;
+      points(x, y) = world.surfaces[std::size_t(hit.surface)].mesh.point(hit.spot).cast<float>();
+    }
+  });
+  return points;
+}
+
+}  // namespace pagesweep::sim

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/sim/srgb_profile.h"
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace pagesweep::sim {
+namespace {
+
+/// Bytes in the order of an ICC profile: big-endian.
+class Bytes {
+ public:
+  Bytes& text(std::string_view letters) {
+    bytes_ += letters;
+    return *this;
+  }
+  Bytes& number(std::uint32_t value) {
+    for (int shift = 24; shift >= 0; shift -= 8) bytes_ += static_cast<char>(value >> shift & 0xFF);
+    return *this;
+  }
+  /// s15Fixed16Number
+  Bytes& fixed(double value) { return number(static_cast<std::uint32_t>(std::lround(value * 65536))); }
+  Bytes& append(const Bytes& other) { return text(other.bytes_); }
+  Bytes& zeros(std::size_t count) {
+    bytes_.append(count, '\0');
+    return *this;
+  }
+  Bytes& pad(std::size_t multiple) { return zeros((multiple - bytes_.size() % multiple) % multiple); }
+  const std::string& get() const { return bytes_; }
+  std::size_t size() const { return bytes_.size(); }
+
+ private:
+  std::string bytes_;
+};
+
+/// multiLocalizedUnicodeType with one text.
+Bytes localized(std::string_view text) {
+  Bytes tag;
+  tag.text("mluc").number(0).number(1).number(12).text("enUS").number(static_cast<std::uint32_t>(2 * text.size()));
+  tag.number(28);
+  for (const char letter : text) tag.zeros(1).text({&letter, 1});
+  return tag.pad(4);
+}
+
+Bytes xyz(double x, double y, double z) { return Bytes().text("XYZ ").number(0).fixed(x).fixed(y).fixed(z); }
+
+struct Tag {
+  std::string_view name;
+  Bytes data;
+};
+
+/// The tags of a matrix profile. Primaries and white are those of sRGB, adapted to D50 by Bradford's matrix.
+std::vector<Tag> make_tags() {
+  Bytes curve;  // parametricCurveType, function 3: ((x + 0.055) / 1.055)^2.4, below 0.04045 x / 12.92
+  curve.text("para").number(0).number(3u << 16);
+  for (const double parameter : {2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045}) curve.fixed(parameter);
+  Bytes adaptation;
+  adaptation.text("sf32").number(0);
+  for (const double value :
+       {1.047882, 0.022918, -0.050217, 0.029587, 0.990479, -0.017059, -0.009232, 0.015076, 0.751678})
+    adaptation.fixed(value);
+  return {{"desc", localized("sRGB")},
+          {"cprt", localized("No copyright, use freely")},
+          {"wtpt", xyz(0.9642, 1.0, 0.8249)},
+          {"rXYZ", xyz(0.43607, 0.22249, 0.01392)},
+          {"gXYZ", xyz(0.38515, 0.71687, 0.09708)},
+          {"bXYZ", xyz(0.14307, 0.06061, 0.71410)},
+          {"rTRC", curve},
+          {"gTRC", curve},
+          {"bTRC", curve},
+          {"chad", adaptation}};
+}
+
+}  // namespace
+
+std::vector<std::byte> make_srgb_profile() {
+  const std::vector<Tag> tags = make_tags();
+  Bytes table, data;
+  const std::size_t data_start = 128 + 4 + 12 * tags.size();
+  table.number(static_cast<std::uint32_t>(tags.size()));
+  for (const Tag& tag : tags) {
+    table.text(tag.name).number(static_cast<std::uint32_t>(data_start + data.size()));
+    table.number(static_cast<std::uint32_t>(tag.data.size()));
+    data.append(tag.data).pad(4);
+  }
+  Bytes profile;
+  profile.number(static_cast<std::uint32_t>(data_start + data.size())).zeros(4).number(0x04300000);
+  profile.text("mntrRGB XYZ ").number(2024u << 16 | 1).number(1u << 16).number(0).text("acsp");
+  profile.zeros(28).fixed(0.9642).fixed(1.0).fixed(0.8249).zeros(48);
+  const std::string bytes = profile.append(table).append(data).get();
+  const auto span = std::as_bytes(std::span(bytes));
+  return {span.begin(), span.end()};
+}
+
+}  // namespace pagesweep::sim
