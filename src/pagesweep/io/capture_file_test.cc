@@ -189,7 +189,7 @@ TEST(CaptureFile, NamesFileFieldAndWhatWasExpected) {
       {"\"notes\": \"made by a test\"", "\"notes\": 4", "notes", "expected a string"},
   };
   for (const Damage& damage : damages) {
-    write_bytes(folder / "capture.json", replaced(sound, damage.from, damage.to));
+    test::put(folder / "capture.json", replaced(sound, damage.from, damage.to));
     EXPECT_THAT(error_of([&] { read_capture(folder.path()); }),
                 AllOf(HasSubstr("capture.json: " + damage.place + ": "), HasSubstr(damage.hint)))
         << damage.from << " -> " << damage.to;

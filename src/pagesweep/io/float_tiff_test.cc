@@ -176,7 +176,7 @@ TEST(FloatTiff, NeverReadsBeyondAFileThatIsCutShort) {
   write_float_tiff(folder / "whole.tiff", {channels[0].view(), channels[1].view()});
   const std::string whole = read_text(folder / "whole.tiff");
   for (std::size_t length = 0; length < whole.size(); length += 1 + length / 30) {
-    write_bytes(folder / "cut.tiff", std::string_view(whole).substr(0, length));
+    test::put(folder / "cut.tiff", std::string_view(whole).substr(0, length));
     EXPECT_THAT(error_of([&] { read_float_tiff(folder / "cut.tiff"); }), HasSubstr("cut.tiff: cannot be read"));
   }
 }

@@ -164,7 +164,7 @@ TEST(GrayImageFile, NeverReadsBeyondAPngThatIsCutShort) {
   write_gray_png(folder / "whole.png", some_gray<std::uint8_t>(64, 48).view());
   const std::string whole = read_text(folder / "whole.png");
   for (std::size_t length = 0; length < whole.size(); length += 1 + length / 40) {
-    write_bytes(folder / "cut.png", std::string_view(whole).substr(0, length));
+    test::put(folder / "cut.png", std::string_view(whole).substr(0, length));
     EXPECT_THAT(error_of([&] { read_gray(folder / "cut.png"); }), HasSubstr("cut.png: cannot be read")) << length;
   }
 }
@@ -176,7 +176,7 @@ TEST(GrayImageFile, NeverReadsBeyondATiffThatIsCutShort) {
       write_tiff(folder / "whole.tif", {.compression = compression, .tile = tile}, some_gray<std::uint16_t>(33, 17));
       const std::string whole = read_text(folder / "whole.tif");
       for (std::size_t length = 0; length < whole.size(); length += 13) {
-        write_bytes(folder / "cut.tif", std::string_view(whole).substr(0, length));
+        test::put(folder / "cut.tif", std::string_view(whole).substr(0, length));
         EXPECT_THAT(error_of([&] { read_gray(folder / "cut.tif"); }), HasSubstr("cut.tif: cannot be read")) << length;
       }
     }
@@ -186,17 +186,9 @@ TEST(GrayImageFile, RefusesAPngThatPromisesMoreThanItHolds) {
   const TestFolder folder;
   write_gray_png(folder / "a.png", Image<std::uint8_t>(8, 8).view());
   std::string bytes = read_text(folder / "a.png");
-  // 65,535 x 65,535 in the header, with the checksum that belongs to it: 4 GB from 80 bytes.
-  const std::string header("IHDR\0\0\xff\xff\0\0\xff\xff\x08\0\0\0\0", 17);
-  std::uint32_t checksum = 0xffffffff;
-  for (const char c : header) {
-    checksum ^= static_cast<unsigned char>(c);
-    for (int k = 0; k < 8; ++k) checksum = (checksum >> 1) ^ (checksum & 1 ? 0xedb88320u : 0);
-  }
-  checksum = ~checksum;
-  bytes.replace(12, 17, header);
-  for (std::size_t k = 0; k < 4; ++k) bytes[29 + k] = static_cast<char>(checksum >> (24 - 8 * k));
-  write_bytes(folder / "bomb.png", bytes);
+  // 4 GB from 80 bytes.
+  bytes.replace(12, 17, std::string("IHDR\0\0\xff\xff\0\0\xff\xff\x08\0\0\0\0", 17));
+  write_bytes(folder / "bomb.png", test::with_checksums(bytes));
   EXPECT_THAT(error_of([&] { read_gray(folder / "bomb.png"); }), HasSubstr("cannot hold 65535 x 65535 pixels"));
   EXPECT_THAT(error_of([&] { read_gray(folder / "bomb.png", ImageSize{8, 8}); }), HasSubstr("expected 8 x 8 pixels"));
 }

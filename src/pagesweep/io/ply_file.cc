@@ -139,7 +139,7 @@ class HeaderReader {
   void read_property(const std::vector<std::string_view>& words) {
     if (header_.elements.empty()) throw error("expected an element before its properties");
     Property property;
-    const bool is_list = words[1] == "list";
+    const bool is_list = words.size() == 5;
     const auto type = type_named(words[is_list ? 3 : 1]);
     const auto count_type = is_list ? type_named(words[2]) : PlyType::uint8;
     if (!type || !count_type) throw error("expected a type of a property, such as float or uchar");

@@ -73,11 +73,11 @@ TEST(PlyFile, HasTheHeaderThatOtherProgramsKnow) {
 
 TEST(PlyFile, ReadsAsciiWithPropertiesInAnyOrder) {
   const TestFolder folder;
-  write_bytes(folder / "a.ply",
-              "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nobj_info x\r\nelement thing 2\r\nproperty int a\r\n"
-              "element vertex 2\r\nproperty double z\r\nproperty uchar red\r\nproperty list uchar int neighbours\r\n"
-              "property float x\r\nproperty float y\r\nelement face 1\r\nproperty list uchar int vertex_indices\r\n"
-              "end_header\r\n7\r\n8\r\n3.5 255 2 0 1 1e1 -2\r\n+4 0 0 nan 6\r\n3 0 1 0\r\n");
+  test::put(folder / "a.ply",
+            "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nobj_info x\r\nelement thing 2\r\nproperty int a\r\n"
+            "element vertex 2\r\nproperty double z\r\nproperty uchar red\r\nproperty list uchar int neighbours\r\n"
+            "property float x\r\nproperty float y\r\nelement face 1\r\nproperty list uchar int vertex_indices\r\n"
+            "end_header\r\n7\r\n8\r\n3.5 255 2 0 1 1e1 -2\r\n+4 0 0 nan 6\r\n3 0 1 0\r\n");
   const PointCloud cloud = read_ply(folder / "a.ply");
   ASSERT_EQ(cloud.size(), 2u);
   EXPECT_EQ(cloud.points[0], Eigen::Vector3f(10, -2, 3.5F));
@@ -94,7 +94,7 @@ TEST(PlyFile, ReadsBigEndianOfEveryType) {
     bytes += std::string("property ") + property + "\n";
   bytes += "end_header\n" + big_endian(1.5) + big_endian(std::int32_t{-70000}) + big_endian(std::int16_t{-3}) +
            big_endian(std::uint16_t{65000}) + "\xfe\xfe" + big_endian(std::uint32_t{4000000000});
-  write_bytes(folder / "a.ply", bytes);
+  test::put(folder / "a.ply", bytes);
   const PointCloud cloud = read_ply(folder / "a.ply");
   ASSERT_EQ(cloud.size(), 1u);
   EXPECT_EQ(cloud.points[0], Eigen::Vector3f(1.5F, -70000, -3));
@@ -105,7 +105,7 @@ TEST(PlyFile, ReadsBigEndianOfEveryType) {
 TEST(PlyFile, NamesWhatIsWrong) {
   const TestFolder folder;
   const auto message = [&](const std::string& text) {
-    write_bytes(folder / "a.ply", text);
+    test::put(folder / "a.ply", text);
     return error_of([&] { read_ply(folder / "a.ply"); });
   };
   const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
@@ -136,7 +136,7 @@ TEST(PlyFile, NeverReadsBeyondAFileThatIsCutShort) {
   write_ply(folder / "whole.ply", some_maps());
   const std::string whole = read_text(folder / "whole.ply");
   for (std::size_t length = 0; length < whole.size(); ++length) {
-    write_bytes(folder / "cut.ply", std::string_view(whole).substr(0, length));
+    test::put(folder / "cut.ply", std::string_view(whole).substr(0, length));
     EXPECT_NE(error_of([&] { read_ply(folder / "cut.ply"); }), "") << length;
   }
 }

@@ -103,7 +103,7 @@ constexpr const char* sound_rig = R"({
 })";
 
 std::string message_about(const TestFolder& folder, const std::string& text) {
-  write_bytes(folder / "rig.json", text);
+  test::put(folder / "rig.json", text);
   return error_of([&] { read_rig(folder / "rig.json"); });
 }
 
@@ -194,7 +194,7 @@ TEST(RigFile, MakesARoundedRotationExact) {
   const TestFolder folder;
   // Seven digits, as many calibrations print them.
   const std::string rounded = "[0.9800666,-0.1986693,0, 0.1986693,0.9800666,0, 0,0,1]";
-  write_bytes(folder / "rig.json", replaced(sound_rig, "[1,0,0, 0,1,0, 0,0,1]", rounded));
+  test::put(folder / "rig.json", replaced(sound_rig, "[1,0,0, 0,1,0, 0,0,1]", rounded));
   const Eigen::Matrix3d rotation = read_rig(folder / "rig.json").cameras[1].cam_from_rig.rotation;
   EXPECT_LT((rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm(), 1e-14);
   EXPECT_LT((rotation - Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()).toRotationMatrix()).norm(), 1e-7);

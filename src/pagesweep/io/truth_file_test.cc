@@ -43,8 +43,8 @@ TEST(TruthFile, KeepsWhatWasWritten) {
 
 TEST(TruthFile, ReadsOneWithoutExtensions) {
   const TestFolder folder;
-  write_bytes(folder / "truth.json",
-              R"({"format": "pagesweep-truth", "version": 1, "pages": [{"index": 1, "pixels_per_mm": 11.811}]})");
+  test::put(folder / "truth.json",
+            R"({"format": "pagesweep-truth", "version": 1, "pages": [{"index": 1, "pixels_per_mm": 11.811}]})");
   const Truth truth = read_truth(folder.path());
   EXPECT_EQ(truth.pages[0].points_subsampling, 1);
   EXPECT_FALSE(truth.stripe || truth.sensor || truth.profile);
@@ -83,7 +83,7 @@ TEST(TruthFile, NamesFileFieldAndWhatWasExpected) {
       {"[0.0, 0.5, 1.0, 0.5, 0.0]", "[1]", "profile.values", "at least 2"},
   };
   for (const Damage& damage : damages) {
-    write_bytes(folder / "truth.json", replaced(sound, damage.from, damage.to));
+    test::put(folder / "truth.json", replaced(sound, damage.from, damage.to));
     EXPECT_THAT(error_of([&] { read_truth(folder.path()); }),
                 AllOf(HasSubstr("truth.json: " + damage.place + ": "), HasSubstr(damage.hint)))
         << damage.from << " -> " << damage.to;
