@@ -13,8 +13,7 @@ namespace {
 constexpr double ease_mm = 15;
 constexpr double model_noise_mm = 0.02;
 
-Support support_of(const HeightField& field, int i, int j) {
-  const CellMean& cell = field.cells(i, j);
+Support support_of(const HeightField& field, const CellMean& cell, int i, int j) {
   Support place;
   place.plan = {field.p_of(i) + cell.p, field.q_of(j) + cell.q};
   place.z = cell.z;
@@ -25,11 +24,11 @@ Support support_of(const HeightField& field, int i, int j) {
 }
 
 /// Cells in or within two cells of the page.
-Image<std::uint8_t> widen(const Image<std::uint8_t>& page) {
+Image<std::uint8_t> widen(const Image<CellMean>& page) {
   Image<std::uint8_t> wide(page.width(), page.height(), 0);
   for (int j = 0; j < page.height(); ++j)
     for (int i = 0; i < page.width(); ++i)
-      if (page(i, j))
+      if (page(i, j).weight > 0)
         for (int dj = -2; dj <= 2; ++dj)
           for (int di = -2; di <= 2; ++di)
             if (wide.contains(i + di, j + dj)) wide(i + di, j + dj) = 1;
@@ -59,31 +58,30 @@ double Differences::at(double p_mm, double q_mm) const {
   return interpolate_nodes(dz, i, j);
 }
 
-std::vector<Support> places_of(const HeightField& field, const Image<std::uint8_t>& page) {
+std::vector<Support> places_of(const HeightField& field, const Image<CellMean>& cells) {
   std::vector<Support> places;
   for (int j = 0; j < field.rows(); ++j)
     for (int i = 0; i < field.columns(); ++i)
-      if (page(i, j) && field.cells(i, j).weight > 0) places.push_back(support_of(field, i, j));
+      if (cells(i, j).weight > 0) places.push_back(support_of(field, cells(i, j), i, j));
   return places;
 }
 
-Differences measure_differences(const HeightField& field, const Image<std::uint8_t>& page, const RuledSurface& model,
+Differences measure_differences(const HeightField& field, const Image<CellMean>& cells, const RuledSurface& model,
                                 double radius_mm) {
-  Image<CellMean> cells(field.columns(), field.rows());
+  Image<CellMean> gaps = cells;
   for (int j = 0; j < field.rows(); ++j)
     for (int i = 0; i < field.columns(); ++i) {
-      if (!page(i, j) || !(field.cells(i, j).weight > 0)) continue;
-      cells(i, j) = field.cells(i, j);
-      const Support place = support_of(field, i, j);
-      cells(i, j).z = static_cast<float>(place.z - height_over(model, place));
+      if (!(cells(i, j).weight > 0)) continue;
+      const Support place = support_of(field, cells(i, j), i, j);
+      gaps(i, j).z = static_cast<float>(place.z - height_over(model, place));
     }
   Differences differences{&field, Image<double>(field.columns(), field.rows(), 0),
                           Image<float>(field.columns(), field.rows(), not_a_number), field.status};
-  const Image<std::uint8_t> wide = widen(page);
+  const Image<std::uint8_t> wide = widen(cells);
   Image<std::uint8_t> known(field.columns(), field.rows(), 0);
   const double radius = std::max(radius_mm, 2.5 * field.cell_mm);
   parallel_rows(field.rows(), [&](int j) {
-    LocalFitter fitter(cells, field.cell_mm);
+    LocalFitter fitter(gaps, field.cell_mm);
     for (int i = 0; i < field.columns(); ++i) {
       // A height that was measured but does not belong to this page is off its surface.
       PixelStatus& status = differences.status(i, j);

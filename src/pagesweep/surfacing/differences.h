@@ -19,12 +19,12 @@ struct Differences {
 };
 
 /// The measured places of a page.
-/// \param page  which cells of the field belong to it
-std::vector<Support> places_of(const HeightField& field, const Image<std::uint8_t>& page);
+/// \param cells  the field's cells as far as they belong to the page
+std::vector<Support> places_of(const HeightField& field, const Image<CellMean>& cells);
 
 /// Local robust fits to the differences between a page's cells and the model. What the model takes away, the page's
 /// bend, the neighbourhood need not follow; dents remain, and the other page stays out of it.
-Differences measure_differences(const HeightField& field, const Image<std::uint8_t>& page, const RuledSurface& model,
+Differences measure_differences(const HeightField& field, const Image<CellMean>& cells, const RuledSurface& model,
                                 double radius_mm);
 
 /// The measured point orthogonally above a point of the model.

@@ -16,10 +16,13 @@ constexpr double steepest_line = 0.25;                  // the gutter is turned 
 constexpr double middle_from = 0.25, middle_to = 0.75;  // share of the paper's width
 
 struct Limits {
-  double kink_rad, side_rad, depth_mm, share;
+  double kink_rad;  // least turn of the paper
+  double side_rad;  // least fall of either side
+  double depth_mm;  // of the valley below its higher side
+  double share;     // of the paper's height that shows it
 };
-constexpr Limits open_book{0.47, 0.10, 3, 0.6};
-constexpr Limits known_book{0.05, -0.2, 0.2, 0.3};
+constexpr Limits open_book{0.47, -0.1, 3, 0.6};  // one side may lie flat: the book's first and last pages
+constexpr Limits known_book{0.05, -0.3, 0.2, 0.3};
 
 struct Valley {
   double p_mm, q_mm, kink_rad;
@@ -85,7 +88,7 @@ std::optional<Valley> sharpest_valley(const std::vector<double>& profile, const 
     if (kink < limits.kink_rad || std::min(fall, rise) < limits.side_rad || (best && kink <= best->kink_rad)) continue;
     const double meet = std::clamp((right->z - left->z) / (left->slope - right->slope), -4.0, 4.0);
     const double bottom = left->z + meet * left->slope;
-    if (std::min(left->highest, right->highest) - bottom < limits.depth_mm) continue;
+    if (std::max(left->highest, right->highest) - bottom < limits.depth_mm) continue;
     best = Valley{field.p_of(i) + meet, 0, kink};
   }
   return best;

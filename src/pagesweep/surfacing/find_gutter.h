@@ -15,8 +15,8 @@ struct Gutter {
   double share = 0;     ///< of the paper's height over which it was seen
 };
 
-/// Finds the gutter by its form: a straight deep valley up the page, near the middle of the paper, to which both sides
-/// fall. Brightness plays no part.
+/// Finds the gutter by its form: a straight deep valley up the page, near the middle of the paper. Brightness plays no
+/// part.
 /// \param certain  it is known that there is one: a shallow valley will do
 /// \return         nothing if there is none
 std::optional<Gutter> find_gutter(const HeightField& field, const Image<std::uint8_t>& paper, bool certain = false);

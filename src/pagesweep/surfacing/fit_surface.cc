@@ -29,16 +29,29 @@ void check(std::span<const PointMap> cameras, const SurfaceOptions& options) {
 
 RulingFrame frame_of(const Gutter& gutter) { return {{gutter.p_mm, gutter.q_mm}, -std::atan(gutter.slope), 0}; }
 
-/// The paper on one side of the gutter, as far as it is farther than `gap_mm` from it. A cell on the gutter sees both
-/// pages.
-Image<std::uint8_t> side_of(const HeightField& field, const Image<std::uint8_t>& paper, const RulingFrame& gutter,
-                            GutterSide side, double gap_mm) {
-  Image<std::uint8_t> page(field.columns(), field.rows(), 0);
-  const double sign = side == GutterSide::right ? -1 : 1;
+/// The field's cells that show paper.
+Image<CellMean> cells_of(const HeightField& field, const Image<std::uint8_t>& paper) {
+  Image<CellMean> cells(field.columns(), field.rows());
+  for (std::size_t k = 0; k < paper.size(); ++k)
+    if (paper.data()[k]) cells.data()[k] = field.cells.data()[k];
+  return cells;
+}
+
+/// The paper on one side of the gutter. A cell on the gutter sees both pages: it gives its points from this side, as
+/// far as they are farther than `gap_mm` away.
+Image<CellMean> side_of(const HeightField& field, const Image<std::uint8_t>& paper, const RulingFrame& gutter,
+                        GutterSide side, double gap_mm) {
+  Image<CellMean> page = cells_of(field, paper);
+  const Eigen::Vector2d outwards = side == GutterSide::left ? gutter.across() : Eigen::Vector2d(-gutter.across());
+  std::vector<PlanPoint> kept;
   for (int j = 0; j < field.rows(); ++j)
     for (int i = 0; i < field.columns(); ++i) {
-      const double a = gutter.across().dot(Eigen::Vector2d(field.p_of(i), field.q_of(j)) - gutter.origin);
-      page(i, j) = paper(i, j) && sign * a > gap_mm;
+      const double distance = outwards.dot(Eigen::Vector2d(field.p_of(i), field.q_of(j)) - gutter.origin);
+      if (!(page(i, j).weight > 0) || distance > gap_mm + field.cell_mm) continue;
+      kept.clear();
+      for (const PlanPoint& point : field.surface_points(i, j))
+        if (outwards.dot(Eigen::Vector2d(point.p, point.q) - gutter.origin) > gap_mm) kept.push_back(point);
+      page(i, j) = mean_of(kept, field.p_of(i), field.q_of(j));
     }
   return page;
 }
@@ -46,12 +59,12 @@ Image<std::uint8_t> side_of(const HeightField& field, const Image<std::uint8_t>&
 /// One page of the book: its cells and its model.
 struct FittedPage {
   GutterSide gutter = GutterSide::none;
-  Image<std::uint8_t> cells;
+  Image<CellMean> cells;
   std::vector<Support> places;
   RuledSurface model;
 };
 
-FittedPage fit_page(const HeightField& field, Image<std::uint8_t> cells, GutterSide side,
+FittedPage fit_page(const HeightField& field, Image<CellMean> cells, GutterSide side,
                     const std::optional<RulingFrame>& gutter, const SurfaceOptions& options) {
   FittedPage page;
   page.gutter = side;
@@ -92,18 +105,20 @@ RulingFrame meeting_line(const RuledSurface& left, const RuledSurface& right, co
   return {gutter.plan_from_ruling(shift, 0), gutter.angle_rad - std::atan(turn), 0};
 }
 
+/// The gutter is where the pages meet, and the pages are what ends at the gutter: from coarse to fine.
 std::vector<FittedPage> fit_both_pages(const HeightField& field, const Image<std::uint8_t>& paper, RulingFrame gutter,
                                        const SurfaceOptions& options) {
-  std::vector<FittedPage> pages;
-  const double nearest = 0.75 * field.cell_mm;
-  // The gutter is where the pages meet, and the pages are what ends at the gutter: twice round suffices.
-  for (const double gap : {nearest + 1.5, nearest + 0.3, nearest}) {
-    pages.clear();
-    for (const GutterSide side : {GutterSide::right, GutterSide::left})
-      pages.push_back(fit_page(field, side_of(field, paper, gutter, side, gap), side, gutter, options));
-    if (gap > nearest) gutter = meeting_line(pages[0].model, pages[1].model, gutter);
+  const auto fit = [&](double gap_mm) {
+    std::vector<FittedPage> pages;
+    for (const GutterSide side : {GutterSide::right, GutterSide::left})  // of the left page, of the right page
+      pages.push_back(fit_page(field, side_of(field, paper, gutter, side, gap_mm), side, gutter, options));
+    return pages;
+  };
+  for (const double gap_mm : {2.0, 0.5}) {
+    const auto pages = fit(gap_mm);
+    gutter = meeting_line(pages[0].model, pages[1].model, gutter);
   }
-  return pages;
+  return fit(0.2);
 }
 
 /// A gutter, if the layout is a spread or turns out to be one.
@@ -115,7 +130,7 @@ std::optional<RulingFrame> choose_gutter(const HeightField& field, const Image<s
   progress.warn("no gutter was found: the paper is divided in its middle");
   double n = 0;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (const Support& place : places_of(field, paper)) {
+  for (const Support& place : places_of(field, cells_of(field, paper))) {
     sum += place.plan;
     n += 1;
   }
@@ -149,7 +164,7 @@ std::vector<PageSurface> fit_surface(std::span<const PointMap> cameras, const Su
   if (gutter)
     fitted = fit_both_pages(field, paper, *gutter, options);
   else
-    fitted.push_back(fit_page(field, paper, GutterSide::none, std::nullopt, options));
+    fitted.push_back(fit_page(field, cells_of(field, paper), GutterSide::none, std::nullopt, options));
   progress.advance(0.75);
 
   std::vector<PageSurface> pages;

@@ -97,6 +97,7 @@ FlatPage::FlatPage(const RuledSurface& model, const Differences& differences, st
       start(i, j) = {up.x(), -up.y()};
     }
   lay_flat(start);
+  spacing_mm_ = fine_enough_spacing();
 }
 
 void FlatPage::follow_measurement() {
@@ -231,24 +232,28 @@ void FlatPage::look_up_status(const Eigen::Vector3d& measured, double normal_z, 
 }
 
 /// Largest error of the interpolated model in the middle of cells, a sample of them, the gutter's among them.
-double FlatPage::interpolation_error(const PageSurface& page, const PlanFrame& frame) const {
+/// Largest error of the interpolated model in the middle of cells, a sample of them, the gutter's among them.
+/// \param page  in plan coordinates
+double FlatPage::interpolation_error(const PageSurface& page) const {
   double largest = 0;
   const Eigen::Vector2d middle(0.5 * (columns_ - 1), 0.5 * (rows_ - 1));
   for (int j = 1; j + 2 < page.rows(); j += std::max(1, page.rows() / 8))
     for (int i = 0; i + 1 < page.columns(); ++i) {
       const double s = page.s_of(i + 0.5), t = page.t_of(j + 0.5);
       const Eigen::Vector2d node = node_at({s, t}, middle);
-      const Eigen::Vector3d exact = frame.rig_from_plan(surface_point(node.x(), node.y()));
-      largest = std::max(largest, (interpolate(page, page.model, s, t) - exact).norm());
+      largest = std::max(largest, (interpolate(page, page.model, s, t) - surface_point(node.x(), node.y())).norm());
     }
   return largest;
 }
 
-PageSurface FlatPage::sample(const PlanFrame& frame) const {
-  for (double spacing = coarsest_spacing_mm;; spacing *= 0.75) {
-    PageSurface page = sample_at(spacing, frame);
-    if (0.75 * spacing < finest_spacing_mm || interpolation_error(page, frame) < interpolation_error_mm) return page;
-  }
+double FlatPage::fine_enough_spacing() const {
+  double spacing = coarsest_spacing_mm;
+  while (0.75 * spacing > finest_spacing_mm &&
+         interpolation_error(sample_at(spacing, PlanFrame{})) > interpolation_error_mm)
+    spacing *= 0.75;
+  return spacing;
 }
+
+PageSurface FlatPage::sample(const PlanFrame& frame) const { return sample_at(spacing_mm_, frame); }
 
 }  // namespace pagesweep

@@ -53,7 +53,8 @@ class FlatPage {
   void find_outline();
   Eigen::Vector2d node_at(const Eigen::Vector2d& paper, Eigen::Vector2d guess) const;
   PageSurface sample_at(double spacing_mm, const PlanFrame& frame) const;
-  double interpolation_error(const PageSurface& page, const PlanFrame& frame) const;
+  double interpolation_error(const PageSurface& page) const;
+  double fine_enough_spacing() const;
   void look_up_status(const Eigen::Vector3d& measured, double normal_z, float& sigma, PixelStatus& status) const;
 
   const RuledSurface& model_;
@@ -63,6 +64,7 @@ class FlatPage {
   CutLength cut_;
   double length0_ = 0, length_step_ = 1, b0_ = 0, b_step_ = 1;
   int columns_ = 0, rows_ = 0;
+  double spacing_mm_ = 2;
   bool follows_ = false;
   Image<Eigen::Vector2d> flat_;             ///< [mm] paper (s, t) of each node
   Eigen::Vector2d low_{0, 0}, high_{0, 0};  ///< [mm] paper coordinates that the grid covers

@@ -12,9 +12,9 @@ namespace {
 
 /// Tukey's biweight keeps 95 % efficiency under Gaussian noise with this cut-off.
 constexpr double tukey_cutoff = 4.685;
-/// Variance of the fitted height over that of the weighted mean: about 4 within a window full of cells, 16 at a
-/// straight border, and growing without bound where the fit extrapolates.
-constexpr double largest_leverage = 40;
+/// Variance of the fitted height over that of the weighted mean: about 4 within a window full of cells, 16 at a straight
+/// border, and growing without bound where the fit extrapolates. A paraboloid gives way to a plane before that.
+constexpr double largest_leverage = 40, largest_leverage_of_paraboloid = 24;
 
 template <int Terms, class Sample>
 Eigen::Matrix<double, Terms, 1> design_row(const Sample& s) {
@@ -58,14 +58,12 @@ void LocalFitter::gather(int column, int row, const Window& window) {
 template <int Terms>
 double LocalFitter::reweight(const Eigen::Matrix<double, Terms, 1>& solution, bool redescending) {
   residuals_.clear();
-  for (const Sample& s : samples_)
-    residuals_.push_back(std::abs(design_row<Terms>(s).dot(solution) - s.z) * std::sqrt(s.weight));
-  std::vector<double>& sorted = residuals_;
-  // Residuals over their expected size; copied because the median sorts them.
-  std::size_t i = 0;
-  for (Sample& s : samples_) s.robust = sorted[i++];
+  for (Sample& s : samples_) {
+    s.robust = std::abs(design_row<Terms>(s).dot(solution) - s.z) * std::sqrt(s.weight);  // for now
+    residuals_.push_back(s.robust);
+  }
   const double freedom = static_cast<double>(Terms) / static_cast<double>(samples_.size());
-  const double scale = 1.4826 * median_of(sorted) / std::sqrt(std::max(0.1, 1 - freedom));
+  const double scale = 1.4826 * median_of(residuals_) / std::sqrt(std::max(0.1, 1 - freedom));
   const double unit = std::max(1.0, scale);
   for (Sample& s : samples_) {
     const double x = s.robust / unit;
@@ -113,7 +111,7 @@ LocalFit LocalFitter::solve(double radius_mm, int steps) {
     variance += l * l * s.weight;
     weights += s.weight;
   }
-  if (!(influence(0) * total < largest_leverage)) return fit;
+  if (!(influence(0) * total < (Terms == 6 ? largest_leverage_of_paraboloid : largest_leverage))) return fit;
   fit.ok = true;
   fit.z = solution(0);
   fit.sigma = std::sqrt(variance);

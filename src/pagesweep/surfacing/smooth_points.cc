@@ -23,137 +23,9 @@ Eigen::Vector3d PlanFrame::rig_from_plan(const Eigen::Vector3d& plan) const {
   return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()) * plan;
 }
 
-namespace {
-
-struct Point {
-  float p, q, z, sigma, intensity;
-};
-
-constexpr std::size_t fewest_points = 30;
-constexpr double outlier_sigmas = 5;
-constexpr int first_pass_step = 2;  // [cells] the first fits need not be dense
-constexpr double largest_field_cells = 4e6;
-
-std::vector<Point> gather_points(std::span<const PointMap> cameras, const PlanFrame& frame) {
-  std::vector<Point> points;
-  const double c = std::cos(frame.angle_rad), s = std::sin(frame.angle_rad);
-  for (const PointMap& map : cameras)
-    for (int y = 0; y < map.height(); ++y)
-      for (int x = 0; x < map.width(); ++x) {
-        if (map.status(x, y) != PixelStatus::ok) continue;
-        const double px = map.x(x, y), py = map.y(x, y);
-        const float z = map.z(x, y), sigma = map.sigma(x, y);
-        if (!std::isfinite(px + py + z) || !(sigma > 0) || !std::isfinite(sigma)) continue;
-        points.push_back({static_cast<float>(c * px + s * py), static_cast<float>(c * py - s * px), z,
-                          std::max(sigma, 1e-3f), map.intensity(x, y)});
-      }
-  return points;
-}
-
-/// Bounds that a few stray points do not blow up: 0.2 % may lie beyond them, widened by a twentieth.
-std::pair<double, double> bounds_of(const std::vector<Point>& points, float Point::* coordinate) {
-  std::vector<float> values;
-  const std::size_t stride = std::max<std::size_t>(1, points.size() / 200000);
-  for (std::size_t i = 0; i < points.size(); i += stride) values.push_back(points[i].*coordinate);
-  const auto at = [&](double share) {
-    const auto n = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), n, values.end());
-    return static_cast<double>(*n);
-  };
-  const double low = at(0.002), high = at(0.998);
-  const double slack = 0.05 * (high - low) + 1;
-  return {low - slack, high + slack};
-}
-
-/// Cells of such a size that the occupied ones hold about four points.
-double choose_cell_mm(const std::vector<Point>& points, double p0, double p1, double q0, double q1) {
-  const double block = std::max(4.0, std::sqrt((p1 - p0) * (q1 - q0) / largest_field_cells));
-  Image<std::uint8_t> occupied(static_cast<int>((p1 - p0) / block) + 1, static_cast<int>((q1 - q0) / block) + 1);
-  for (const Point& point : points) {
-    const int i = static_cast<int>((point.p - p0) / block), j = static_cast<int>((point.q - q0) / block);
-    if (occupied.contains(i, j)) occupied(i, j) = 1;
-  }
-  const auto blocks = std::max<std::ptrdiff_t>(1, std::ranges::count(occupied.pixels(), 1));
-  const double density = static_cast<double>(points.size()) / (static_cast<double>(blocks) * block * block);
-  const double smallest = std::sqrt((p1 - p0) * (q1 - q0) / largest_field_cells);
-  // Sparse points: one a cell must do, so that the neighbourhood, which has at least 2.5 cells, still holds twenty.
-  const double largest = std::max(2.0, std::sqrt(1 / density));
-  return std::max(std::clamp(std::sqrt(4 / density), 1.0, largest), smallest);
-}
-
-HeightField empty_field(const std::vector<Point>& points, const SmoothingOptions& options) {
-  const auto [p0, p1] = bounds_of(points, &Point::p);
-  const auto [q0, q1] = bounds_of(points, &Point::q);
-  HeightField field;
-  field.frame.angle_rad = options.reading_direction_rad;
-  field.cell_mm = options.cell_mm > 0 ? options.cell_mm : choose_cell_mm(points, p0, p1, q0, q1);
-  field.p0_mm = p0;
-  field.q0_mm = q0;
-  const int columns = static_cast<int>((p1 - p0) / field.cell_mm) + 2;
-  const int rows = static_cast<int>((q1 - q0) / field.cell_mm) + 2;
-  field.cells = Image<CellMean>(columns, rows);
-  field.z = field.sigma = field.intensity = Image<float>(columns, rows, not_a_number);
-  field.status = Image<PixelStatus>(columns, rows, PixelStatus::not_computed);
-  field.points = static_cast<std::int64_t>(points.size());
-  return field;
-}
-
-/// The points in the order of their cells; the points of cell k are [first[k], first[k + 1]).
-struct SortedPoints {
-  std::vector<Point> points;
-  std::vector<std::size_t> first;
-  std::span<const Point> of(std::size_t cell) const {
-    return {points.data() + first[cell], first[cell + 1] - first[cell]};
-  }
-};
-
-SortedPoints sort_into_cells(const std::vector<Point>& points, const HeightField& field) {
-  const std::size_t none = field.z.size();
-  std::vector<std::size_t> cell_of(points.size(), none);
-  SortedPoints sorted;
-  sorted.first.assign(none + 1, 0);
-  for (std::size_t n = 0; n < points.size(); ++n) {
-    const int i = static_cast<int>(std::lround(field.i_of(points[n].p)));
-    const int j = static_cast<int>(std::lround(field.j_of(points[n].q)));
-    if (!field.z.contains(i, j)) continue;
-    cell_of[n] = static_cast<std::size_t>(j) * static_cast<std::size_t>(field.columns()) + static_cast<std::size_t>(i);
-    ++sorted.first[cell_of[n] + 1];
-  }
-  for (std::size_t k = 0; k < none; ++k) sorted.first[k + 1] += sorted.first[k];
-  sorted.points.resize(sorted.first[none]);
-  std::vector<std::size_t> next(sorted.first.begin(), sorted.first.end() - 1);
-  for (std::size_t n = 0; n < points.size(); ++n)
-    if (cell_of[n] != none) sorted.points[next[cell_of[n]]++] = points[n];
-  return sorted;
-}
-
-/// Of each cell the point of median height: robust, and good enough to begin with.
-Image<CellMean> median_points(const SortedPoints& sorted, const HeightField& field) {
-  Image<CellMean> cells(field.columns(), field.rows());
-  parallel_rows(field.rows(), [&](int j) {
-    std::vector<Point> points;
-    for (int i = 0; i < field.columns(); ++i) {
-      const auto members = sorted.of(static_cast<std::size_t>(j) * static_cast<std::size_t>(field.columns()) +
-                                     static_cast<std::size_t>(i));
-      if (members.empty()) continue;
-      points.assign(members.begin(), members.end());
-      const auto middle = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
-      std::nth_element(points.begin(), middle, points.end(), [](const Point& a, const Point& b) { return a.z < b.z; });
-      CellMean& cell = cells(i, j);
-      cell.p = static_cast<float>(middle->p - field.p_of(i));
-      cell.q = static_cast<float>(middle->q - field.q_of(j));
-      cell.z = middle->z;
-      cell.weight = 1 / (middle->sigma * middle->sigma);
-      cell.count = 1;
-    }
-  });
-  return cells;
-}
-
-/// Weighted mean and covariance of the inlying points of a cell around its centre.
-CellMean mean_of(std::span<const Point> points, double p_mm, double q_mm) {
+CellMean mean_of(std::span<const PlanPoint> points, double p_mm, double q_mm) {
   double w = 0, p = 0, q = 0, z = 0, pp = 0, pq = 0, qq = 0, intensity = 0;
-  for (const Point& point : points) {
+  for (const PlanPoint& point : points) {
     const double weight = 1 / (static_cast<double>(point.sigma) * point.sigma);
     const double u = point.p - p_mm, v = point.q - q_mm;
     w += weight;
@@ -180,50 +52,172 @@ CellMean mean_of(std::span<const Point> points, double p_mm, double q_mm) {
           static_cast<int>(points.size())};
 }
 
+namespace {
+
+constexpr std::size_t fewest_points = 30;
+constexpr double outlier_sigmas = 5;
+constexpr double edge_scatter = 2.5;  // residuals of so many times the noise are more than noise
+constexpr int first_pass_step = 2;    // [cells] the first fits need not be dense
+constexpr double largest_field_cells = 4e6;
+
+std::vector<PlanPoint> gather_points(std::span<const PointMap> cameras, const PlanFrame& frame) {
+  std::vector<PlanPoint> points;
+  const double c = std::cos(frame.angle_rad), s = std::sin(frame.angle_rad);
+  for (const PointMap& map : cameras)
+    for (int y = 0; y < map.height(); ++y)
+      for (int x = 0; x < map.width(); ++x) {
+        if (map.status(x, y) != PixelStatus::ok) continue;
+        const double px = map.x(x, y), py = map.y(x, y);
+        const float z = map.z(x, y), sigma = map.sigma(x, y);
+        if (!std::isfinite(px + py + z) || !(sigma > 0) || !std::isfinite(sigma)) continue;
+        points.push_back({static_cast<float>(c * px + s * py), static_cast<float>(c * py - s * px), z,
+                          std::max(sigma, 1e-3f), map.intensity(x, y)});
+      }
+  return points;
+}
+
+/// Bounds that a few stray points do not blow up: 0.2 % may lie beyond them, widened by a twentieth.
+std::pair<double, double> bounds_of(const std::vector<PlanPoint>& points, float PlanPoint::* coordinate) {
+  std::vector<float> values;
+  const std::size_t stride = std::max<std::size_t>(1, points.size() / 200000);
+  for (std::size_t i = 0; i < points.size(); i += stride) values.push_back(points[i].*coordinate);
+  const auto at = [&](double share) {
+    const auto n = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), n, values.end());
+    return static_cast<double>(*n);
+  };
+  const double low = at(0.002), high = at(0.998);
+  const double slack = 0.05 * (high - low) + 1;
+  return {low - slack, high + slack};
+}
+
+/// Cells of such a size that the occupied ones hold about four points.
+double choose_cell_mm(const std::vector<PlanPoint>& points, double p0, double p1, double q0, double q1) {
+  const double block = std::max(4.0, std::sqrt((p1 - p0) * (q1 - q0) / largest_field_cells));
+  Image<std::uint8_t> occupied(static_cast<int>((p1 - p0) / block) + 1, static_cast<int>((q1 - q0) / block) + 1);
+  for (const PlanPoint& point : points) {
+    const int i = static_cast<int>((point.p - p0) / block), j = static_cast<int>((point.q - q0) / block);
+    if (occupied.contains(i, j)) occupied(i, j) = 1;
+  }
+  const auto blocks = std::max<std::ptrdiff_t>(1, std::ranges::count(occupied.pixels(), 1));
+  const double density = static_cast<double>(points.size()) / (static_cast<double>(blocks) * block * block);
+  const double smallest = std::sqrt((p1 - p0) * (q1 - q0) / largest_field_cells);
+  // Sparse points: one a cell must do, so that the neighbourhood, which has at least 2.5 cells, still holds twenty.
+  const double largest = std::max(2.0, std::sqrt(1 / density));
+  return std::max(std::clamp(std::sqrt(4 / density), 1.0, largest), smallest);
+}
+
+HeightField empty_field(const std::vector<PlanPoint>& points, const SmoothingOptions& options) {
+  const auto [p0, p1] = bounds_of(points, &PlanPoint::p);
+  const auto [q0, q1] = bounds_of(points, &PlanPoint::q);
+  HeightField field;
+  field.frame.angle_rad = options.reading_direction_rad;
+  field.cell_mm = options.cell_mm > 0 ? options.cell_mm : choose_cell_mm(points, p0, p1, q0, q1);
+  field.p0_mm = p0;
+  field.q0_mm = q0;
+  const int columns = static_cast<int>((p1 - p0) / field.cell_mm) + 2;
+  const int rows = static_cast<int>((q1 - q0) / field.cell_mm) + 2;
+  field.cells = Image<CellMean>(columns, rows);
+  field.z = field.sigma = field.intensity = Image<float>(columns, rows, not_a_number);
+  field.status = Image<PixelStatus>(columns, rows, PixelStatus::not_computed);
+  field.points = static_cast<std::int64_t>(points.size());
+  return field;
+}
+
+SortedPoints sort_into_cells(const std::vector<PlanPoint>& points, const HeightField& field) {
+  const std::size_t none = field.z.size();
+  std::vector<std::size_t> cell_of(points.size(), none);
+  SortedPoints sorted;
+  sorted.first.assign(none + 1, 0);
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    const int i = static_cast<int>(std::lround(field.i_of(points[n].p)));
+    const int j = static_cast<int>(std::lround(field.j_of(points[n].q)));
+    if (!field.z.contains(i, j)) continue;
+    cell_of[n] = field.index(i, j);
+    ++sorted.first[cell_of[n] + 1];
+  }
+  for (std::size_t k = 0; k < none; ++k) sorted.first[k + 1] += sorted.first[k];
+  sorted.points.resize(sorted.first[none]);
+  std::vector<std::size_t> next(sorted.first.begin(), sorted.first.end() - 1);
+  for (std::size_t n = 0; n < points.size(); ++n)
+    if (cell_of[n] != none) sorted.points[next[cell_of[n]]++] = points[n];
+  return sorted;
+}
+
+/// Of each cell the point of median height: robust, and good enough to begin with.
+Image<CellMean> median_points(const HeightField& field) {
+  Image<CellMean> cells(field.columns(), field.rows());
+  parallel_rows(field.rows(), [&](int j) {
+    std::vector<PlanPoint> points;
+    for (int i = 0; i < field.columns(); ++i) {
+      const auto members = field.sorted.of(field.index(i, j));
+      if (members.empty()) continue;
+      points.assign(members.begin(), members.end());
+      const auto middle = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
+      std::nth_element(points.begin(), middle, points.end(),
+                       [](const PlanPoint& a, const PlanPoint& b) { return a.z < b.z; });
+      CellMean& cell = cells(i, j);
+      cell.p = static_cast<float>(middle->p - field.p_of(i));
+      cell.q = static_cast<float>(middle->q - field.q_of(j));
+      cell.z = middle->z;
+      cell.weight = 1 / (middle->sigma * middle->sigma);
+      cell.count = 1;
+    }
+  });
+  return cells;
+}
+
 /// Robust fits to the median points, every few cells, and the noise they show.
 Image<LocalFit> first_fits(const Image<CellMean>& medians, HeightField& field, double radius_mm) {
   Image<LocalFit> fits((field.columns() - 1) / first_pass_step + 1, (field.rows() - 1) / first_pass_step + 1);
-  parallel_rows(fits.height(), [&](int j) {
-    LocalFitter fitter(medians, field.cell_mm);
-    for (int i = 0; i < fits.width(); ++i)
-      fits(i, j) = fitter.fit(i * first_pass_step, j * first_pass_step, {radius_mm}, 6);
-  });
+  const auto fit_all = [&](double too_much) {
+    parallel_rows(fits.height(), [&](int j) {
+      LocalFitter fitter(medians, field.cell_mm);
+      for (int i = 0; i < fits.width(); ++i)
+        if (!fits(i, j).ok || fits(i, j).scatter > too_much)
+          fits(i, j) = fitter.fit_along_edges(i * first_pass_step, j * first_pass_step, radius_mm, 6, too_much);
+    });
+  };
+  fit_all(std::numeric_limits<double>::infinity());
   std::vector<double> scatters;
   for (const LocalFit& fit : fits.pixels())
     if (fit.ok) scatters.push_back(fit.scatter);
   if (scatters.empty()) return fits;
   std::ranges::nth_element(scatters, scatters.begin() + static_cast<std::ptrdiff_t>(scatters.size() / 2));
   field.noise_factor = std::max(0.1, scatters[scatters.size() / 2]);
+  fit_all(edge_scatter * std::max(1.0, field.noise_factor));
   return fits;
 }
 
-/// Replaces the cells by the means of the points that lie within reach of the first fits.
-void keep_inliers(const SortedPoints& sorted, const Image<LocalFit>& fits, HeightField& field) {
+/// Whether a point agrees with one of the first fits around it. At an edge of the surface those on its own side do.
+bool is_inlier(const PlanPoint& point, const Image<LocalFit>& fits, const HeightField& field) {
+  const double own = field.noise_factor * point.sigma;
+  const int i0 = static_cast<int>(field.i_of(point.p)) / first_pass_step;
+  const int j0 = static_cast<int>(field.j_of(point.q)) / first_pass_step;
+  for (const auto& [i, j] : {std::pair(i0, j0), {i0 + 1, j0}, {i0, j0 + 1}, {i0 + 1, j0 + 1}}) {
+    if (!fits.contains(i, j) || !fits(i, j).ok) continue;
+    const double u = point.p - field.p_of(i * first_pass_step), v = point.q - field.q_of(j * first_pass_step);
+    const double residual = point.z - fits(i, j).at(u, v);
+    if (std::abs(residual) < outlier_sigmas * std::hypot(own, fits(i, j).scatter_mm)) return true;
+  }
+  return false;
+}
+
+/// Puts each cell's points that agree with the first fits before those that do not, and averages them.
+void keep_inliers(const Image<LocalFit>& fits, HeightField& field) {
   std::vector<std::int64_t> kept(static_cast<std::size_t>(field.rows()), 0);
   parallel_rows(field.rows(), [&](int j) {
-    std::vector<Point> inliers;
     for (int i = 0; i < field.columns(); ++i) {
-      const auto members = sorted.of(static_cast<std::size_t>(j) * static_cast<std::size_t>(field.columns()) +
-                                     static_cast<std::size_t>(i));
-      if (members.empty()) continue;
-      const int fi = std::min(fits.width() - 1, (i + first_pass_step / 2) / first_pass_step);
-      const int fj = std::min(fits.height() - 1, (j + first_pass_step / 2) / first_pass_step);
-      const LocalFit& fit = fits(fi, fj);
-      inliers.clear();
-      for (const Point& point : members) {
-        if (!fit.ok) break;
-        const double residual =
-            point.z - fit.at(point.p - field.p_of(fi * first_pass_step), point.q - field.q_of(fj * first_pass_step));
-        const double own = field.noise_factor * point.sigma;
-        if (std::abs(residual) < outlier_sigmas * std::hypot(own, fit.scatter_mm)) inliers.push_back(point);
-      }
-      field.cells(i, j) = mean_of(inliers, field.p_of(i), field.q_of(j));
+      const std::span<PlanPoint> members = field.sorted.of(field.index(i, j));
+      const auto outliers =
+          std::ranges::stable_partition(members, [&](const PlanPoint& point) { return is_inlier(point, fits, field); });
+      const auto inliers = members.first(members.size() - outliers.size());
       // Twice as many outliers as inliers: what is left may be chance.
       if (3 * inliers.size() < members.size()) {
-        field.cells(i, j) = {};
         field.status(i, j) = PixelStatus::off_surface;
-        inliers.clear();
+        continue;
       }
+      field.cells(i, j) = mean_of(inliers, field.p_of(i), field.q_of(j));
       kept[static_cast<std::size_t>(j)] += static_cast<std::int64_t>(inliers.size());
     }
   });
@@ -235,7 +229,7 @@ void fit_all_cells(HeightField& field, double radius_mm) {
   parallel_rows(field.rows(), [&](int j) {
     LocalFitter fitter(field.cells, field.cell_mm);
     for (int i = 0; i < field.columns(); ++i) {
-      const LocalFit fit = fitter.fit_along_edges(i, j, radius_mm, 2, 2.5 * std::max(1.0, field.noise_factor));
+      const LocalFit fit = fitter.fit_along_edges(i, j, radius_mm, 2, edge_scatter * std::max(1.0, field.noise_factor));
       if (field.cells(i, j).count > 0) field.intensity(i, j) = field.cells(i, j).intensity;
       if (!fit.ok) continue;
       field.z(i, j) = static_cast<float>(fit.z);
@@ -282,18 +276,18 @@ void tell_reasons(std::span<const PointMap> cameras, HeightField& field) {
 }  // namespace
 
 HeightField smooth_points(std::span<const PointMap> cameras, const SmoothingOptions& options, Progress& progress) {
-  const std::vector<Point> points = gather_points(cameras, {options.reading_direction_rad});
+  const std::vector<PlanPoint> points = gather_points(cameras, {options.reading_direction_rad});
   if (points.size() < fewest_points)
     throw no_result(
         fmt::format("only {} surface points were measured, at least {} are needed: look at the status maps "
                     "of the cameras for the reason",
                     points.size(), fewest_points));
   HeightField field = empty_field(points, options);
-  const SortedPoints sorted = sort_into_cells(points, field);
+  field.sorted = sort_into_cells(points, field);
   const double radius_mm = std::max(options.radius_mm, 2.5 * field.cell_mm);
-  const Image<LocalFit> fits = first_fits(median_points(sorted, field), field, radius_mm);
+  const Image<LocalFit> fits = first_fits(median_points(field), field, radius_mm);
   progress.advance(0.2);
-  keep_inliers(sorted, fits, field);
+  keep_inliers(fits, field);
   fit_all_cells(field, radius_mm);
   tell_reasons(cameras, field);
   progress.advance(0.4);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "pagesweep/base/progress.h"
 #include "pagesweep/data/point_map.h"
@@ -18,13 +19,34 @@ struct PlanFrame {
   Eigen::Vector3d rig_from_plan(const Eigen::Vector3d& plan) const;
 };
 
+/// A measured point in plan coordinates.
+struct PlanPoint {
+  float p, q, z, sigma;  ///< [mm]
+  float intensity;       ///< [gray values]
+};
+
+/// Points in the order of the cells of a grid (row by row), of each cell those on the surface first.
+struct SortedPoints {
+  std::vector<PlanPoint> points;
+  std::vector<std::size_t> first;  ///< the points of cell k are [first[k], first[k + 1])
+
+  std::span<PlanPoint> of(std::size_t cell) { return {points.data() + first[cell], first[cell + 1] - first[cell]}; }
+  std::span<const PlanPoint> of(std::size_t cell) const {
+    return {points.data() + first[cell], first[cell + 1] - first[cell]};
+  }
+};
+
+/// Weighted mean and covariance of points; positions are against (p_mm, q_mm).
+CellMean mean_of(std::span<const PlanPoint> points, double p_mm, double q_mm);
+
 /// The measured surface as heights z(p, q) on a regular grid seen from above: cell (i, j) has its centre at
 /// p = p0_mm + i cell_mm, q = q0_mm + j cell_mm. Row 0 is the lower end of the page.
 struct HeightField {
   PlanFrame frame;
   double cell_mm = 1;
   double p0_mm = 0, q0_mm = 0;
-  Image<CellMean> cells;      ///< the inlying points of each cell
+  Image<CellMean> cells;      ///< the mean of each cell's points on the surface; count says how many they are
+  SortedPoints sorted;        ///< all points within the grid
   Image<float> z;             ///< [mm] locally fitted surface at the cell's centre; NaN where status is not ok
   Image<float> sigma;         ///< [mm] its standard deviation
   Image<float> intensity;     ///< [gray values] mean amplitude of the stripe; NaN where no point is
@@ -39,6 +61,13 @@ struct HeightField {
   double q_of(double j) const { return q0_mm + j * cell_mm; }
   double i_of(double p_mm) const { return (p_mm - p0_mm) / cell_mm; }
   double j_of(double q_mm) const { return (q_mm - q0_mm) / cell_mm; }
+  std::size_t index(int i, int j) const {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(columns()) + static_cast<std::size_t>(i);
+  }
+  /// The points of cell (i, j) that lie on the surface.
+  std::span<const PlanPoint> surface_points(int i, int j) const {
+    return sorted.of(index(i, j)).first(static_cast<std::size_t>(cells(i, j).count));
+  }
 };
 
 struct SmoothingOptions {
