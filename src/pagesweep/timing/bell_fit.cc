@@ -16,12 +16,6 @@ double inverse_mills_ratio(double z) {
   return std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi) / (0.5 * std::erfc(-z / std::numbers::sqrt2));
 }
 
-/// Weight of a residual that is `normalised` standard deviations large: 1 for small ones, 0 from 6 on.
-double biweight(double normalised) {
-  const double u = normalised / 6;
-  return std::abs(u) < 1 ? (1 - u * u) * (1 - u * u) : 0;
-}
-
 /// Sums over all samples for one Gauss-Newton step in N unknowns.
 template <int N>
 struct Step {
@@ -38,6 +32,7 @@ struct Step {
   }
 };
 
+/// N = 3, 4 or 5 unknowns stand for BellUnknowns basic, width, curved_background.
 template <int N>
 class Fitter {
  public:
@@ -48,6 +43,7 @@ class Fitter {
   BellFit run() {
     BellFit fit;
     fit.bell = start_;
+    fit.unknowns = N;
     const double longest_step = 0.3 * profile_.full_width_half_maximum() * start_.width;
     for (int iteration = 0; iteration < options_.most_iterations && !fit.converged; ++iteration) {
       const Step<N> step = sum(fit.bell);
@@ -71,19 +67,29 @@ class Fitter {
     for (std::size_t k = 0; k < gray_.size(); ++k) {
       const double gray = gray_[k];
       if (std::isnan(gray)) continue;
-      const double t = (first_frame_ + static_cast<double>(k) - bell.time) * per_width;
+      const double after = first_frame_ + static_cast<double>(k) - bell.time;
+      const double t = after * per_width;
       const auto [value, slope] = profile_.at(t);
-      const double model = bell.amplitude * value + bell.background;
+      double model = bell.amplitude * value + bell.background;
       double j[N];
       j[0] = value;
       j[1] = 1;
       j[2] = -bell.amplitude * slope * per_width;
       if constexpr (N == 4) j[3] = -bell.amplitude * slope * t;
+      if constexpr (N == 5) {
+        model += after * (bell.slope + after * bell.curvature);
+        j[3] = after;
+        j[4] = after * after;
+      }
       const double precision = 1 / noise_.variance(model);
-      if (std::isinf(gray))
+      if (std::isinf(gray)) {
         add_clipped(step, j, model, precision);
-      else
-        add_measured(step, j, gray - model, precision, bell.amplitude);
+        continue;
+      }
+      const double residual = gray - model;
+      step.add(j, precision, precision * residual);
+      step.chi_square += precision * residual * residual;
+      ++step.samples;
     }
     if constexpr (N == 4) {
       const double prior = 1 / (options_.log_width_sigma * options_.log_width_sigma);
@@ -91,18 +97,6 @@ class Fitter {
       step.gradient(3) -= prior * std::log(bell.width / start_.width);
     }
     return step;
-  }
-
-  void add_measured(Step<N>& step, const double (&j)[N], double residual, double precision, double amplitude) const {
-    double weight = precision;
-    if (options_.robust) {
-      // A model can be no better than a hundredth or two of the amplitude: less is no reason for distrust.
-      const double tolerance = 0.015 * amplitude;
-      weight *= biweight(residual / std::sqrt(1 / precision + tolerance * tolerance));
-    }
-    step.add(j, weight, weight * residual);
-    step.chi_square += weight * residual * residual;
-    ++step.samples;
   }
 
   void add_clipped(Step<N>& step, const double (&j)[N], double model, double precision) const {
@@ -121,6 +115,10 @@ class Fitter {
     bell.background += change(1);
     bell.time += std::clamp(change(2), -longest_step, longest_step);
     if constexpr (N == 4) bell.width *= std::exp(std::clamp(change(3), -0.3, 0.3));
+    if constexpr (N == 5) {
+      bell.slope += change(3);
+      bell.curvature += change(4);
+    }
     const Eigen::Matrix<double, N, N> covariance = solver.solve(Eigen::Matrix<double, N, N>::Identity());
     fit.covariance.template topLeftCorner<N, N>() = covariance;
     return std::sqrt(std::max(0.0, covariance(2, 2)));
@@ -136,21 +134,21 @@ class Fitter {
 
 }  // namespace
 
-double BellFit::time_sigma() const { return std::sqrt(covariance(2, 2)); }
-
-double BellFit::reduced_chi_square() const {
-  const int unknowns = covariance(3, 3) > 0 ? 4 : 3;
-  return chi_square / std::max(1, samples - unknowns);
-}
-
 BellFit fit_bell(std::span<const float> gray, int first_frame, const StripeProfile& profile, const SensorNoise& noise,
                  const Bell& start, const BellFitOptions& options) {
-  if (options.fit_width) return Fitter<4>(gray, first_frame, profile, noise, start, options).run();
+  switch (options.unknowns) {
+    case BellUnknowns::width:
+      return Fitter<4>(gray, first_frame, profile, noise, start, options).run();
+    case BellUnknowns::curved_background:
+      return Fitter<5>(gray, first_frame, profile, noise, start, options).run();
+    case BellUnknowns::basic:
+      break;
+  }
   return Fitter<3>(gray, first_frame, profile, noise, start, options).run();
 }
 
-Eigen::Vector4d bell_gradient(const Bell& bell, const StripeProfile& profile, double time) {
-  const double t = (time - bell.time) / bell.width;
+Eigen::Vector4d bell_gradient(const Bell& bell, const StripeProfile& profile, double frame) {
+  const double t = (frame - bell.time) / bell.width;
   const auto [value, slope] = profile.at(t);
   return {value, 1, -bell.amplitude * slope / bell.width, -bell.amplitude * slope * t};
 }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "pagesweep/timing/sensor_noise.h"
@@ -9,31 +11,51 @@
 
 namespace pagesweep {
 
-/// The stripe as one pixel sees it: gray(t) = amplitude profile((t - time) / width) + background.
+/// The stripe as one pixel sees it: gray(t) = amplitude profile((t - time) / width) + background
+/// + slope (t - time) + curvature (t - time)^2. The last two are 0 unless the background is fitted as curved.
 struct Bell {
   double amplitude = 0;   ///< [gray values]
   double background = 0;  ///< [gray values]
   double time = 0;        ///< [frames]
   double width = 1;       ///< of the stripe here, relative to the profile's
+  double slope = 0;       ///< [gray values / frame]
+  double curvature = 0;   ///< [gray values / frame^2]
+
+  double background_at(double frame) const {
+    const double t = frame - time;
+    return background + t * (slope + t * curvature);
+  }
+  double gray_at(double frame, const StripeProfile& profile) const {
+    return amplitude * profile.value((frame - time) / width) + background_at(frame);
+  }
+};
+
+/// What is unknown besides amplitude, background and time.
+enum class BellUnknowns {
+  basic,              ///< nothing
+  width,              ///< the log width, known beforehand to log_width_sigma
+  curved_background,  ///< slope and curvature of the background: light from elsewhere that changes while the stripe
+                      ///< passes
 };
 
 struct BellFitOptions {
-  bool fit_width = false;        ///< the width is unknown too, known beforehand to log_width_sigma
+  BellUnknowns unknowns = BellUnknowns::basic;
   double log_width_sigma = 0.2;  ///< standard deviation of log width around the start value
-  bool robust = false;           ///< samples that the bell does not explain lose their weight (Tukey's biweight)
   int most_iterations = 12;
 };
 
 struct BellFit {
   Bell bell;
-  /// Of (amplitude, background, time, log width), from the Fisher information; 0 for a width that was not fitted.
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  /// Of (amplitude, background, time), then (log width) or (slope, curvature), from the Fisher information; else 0.
+  Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
+  int unknowns = 3;
   double chi_square = 0;  ///< sum of squared residuals over their variances, unclipped samples
   int samples = 0;        ///< unclipped samples that took part
   bool converged = false;
 
-  double time_sigma() const;          ///< [frames]
-  double reduced_chi_square() const;  ///< 1 where the model holds
+  double time_sigma() const { return std::sqrt(covariance(2, 2)); }  ///< [frames]
+  double log_width_sigma() const { return std::sqrt(covariance(3, 3)); }
+  double reduced_chi_square() const { return chi_square / std::max(1, samples - unknowns); }  ///< 1: the model holds
 };
 
 /// Maximum likelihood estimate of a bell: Gauss-Newton steps on
@@ -47,7 +69,7 @@ struct BellFit {
 BellFit fit_bell(std::span<const float> gray, int first_frame, const StripeProfile& profile, const SensorNoise& noise,
                  const Bell& start, const BellFitOptions& options = {});
 
-/// Row of the Jacobian: d model / d (amplitude, background, time, log width) at a time.
-Eigen::Vector4d bell_gradient(const Bell& bell, const StripeProfile& profile, double time);
+/// d gray / d (amplitude, background, time, log width) at a frame, for a bell on an even background.
+Eigen::Vector4d bell_gradient(const Bell& bell, const StripeProfile& profile, double frame);
 
 }  // namespace pagesweep

@@ -56,7 +56,8 @@ TimeMap estimate_times(const Frames& frames, const StripeProfile& profile, const
                        const StripeWidths& widths, const TimingOptions& options, Progress& progress) {
   SensorNoise seen = noise;
   if (options.use_saturated) seen.ceiling = std::numeric_limits<double>::infinity();
-  const PixelJudge judge{profile, seen, frames.count(), options.min_amplitude, options.max_sigma};
+  const PixelJudge judge{
+      profile, seen, frames.count(), options.min_amplitude, options.max_sigma, !options.use_saturated};
   TimeMap map(frames.width(), frames.height());
   constexpr int rows_a_step = 64, rows_a_range = 4;
   for (int first = 0; first < frames.height(); first += rows_a_step) {

@@ -17,10 +17,10 @@ namespace {
 struct Pupil {
   std::size_t camera = 0;
   std::vector<float> gray;
-  int first_frame = 0;  ///< of gray, after it was cut to the stripe's surroundings
-  int clipped = 0;      ///< samples
-  double middle = 0;    ///< [frames] between the crossings of half height
-  double fwhm = 0;      ///< [frames]
+  int first_frame = 0;   ///< of gray, after it was cut to the stripe's surroundings
+  bool clipped = false;  ///< or so near to it that only its noise decided
+  double middle = 0;     ///< [frames] between the crossings of half height
+  double fwhm = 0;       ///< [frames]
   Bell bell;
   std::uint64_t rank = 0;  ///< random, fixed by the pixel's place
 };
@@ -67,7 +67,6 @@ bool examine(Pupil& pupil, double ceiling) {
     const float gray = pupil.gray[static_cast<std::size_t>(i)];
     if (std::isnan(gray)) continue;
     const double seen = std::min(static_cast<double>(gray), ceiling);
-    pupil.clipped += std::isinf(gray);
     if (!present.empty()) changes.push_back(std::abs(seen - present.back()));
     present.push_back(seen);
     if (peak < 0 || gray > pupil.gray[static_cast<std::size_t>(peak)]) peak = i;
@@ -80,6 +79,7 @@ bool examine(Pupil& pupil, double ceiling) {
   pupil.bell.background = *quarter;
   pupil.bell.amplitude = high - pupil.bell.background;
   const double noise = std::max(median(changes), 0.5);
+  pupil.clipped = high > 0.97 * ceiling;
   if (pupil.bell.amplitude < 10 * noise) return false;
   const auto half = static_cast<float>(pupil.bell.background + 0.5 * pupil.bell.amplitude);
   const double rise = crossing(pupil.gray, peak, -1, half), fall = crossing(pupil.gray, peak, 1, half);
@@ -121,9 +121,9 @@ double typical_width(const std::vector<Pupil>& pupils) {
 /// Keeps the best teachers of one camera: unclipped if there are enough, bright, of usual width, wholly recorded.
 std::vector<Pupil> select(std::vector<Pupil> pupils, std::size_t most, int frame_count) {
   constexpr std::size_t enough = 60;
-  const auto unclipped = std::ranges::count_if(pupils, [](const Pupil& p) { return p.clipped == 0; });
+  const auto unclipped = std::ranges::count_if(pupils, [](const Pupil& p) { return !p.clipped; });
   if (static_cast<std::size_t>(unclipped) >= std::min(enough, std::max<std::size_t>(1, pupils.size() / 4)))
-    std::erase_if(pupils, [](const Pupil& p) { return p.clipped > 0; });
+    std::erase_if(pupils, [](const Pupil& p) { return p.clipped; });
   if (pupils.empty()) return pupils;
   std::vector<double> amplitudes;
   for (const Pupil& pupil : pupils) amplitudes.push_back(pupil.bell.amplitude);
@@ -164,7 +164,7 @@ class Teacher {
     fwhm_ = typical_width(pupils_);
     reach_ = 2.5 * fwhm_;
     learned_.profile = raised_cosine(fwhm_);
-    only_flanks_ = std::ranges::all_of(pupils_, [](const Pupil& p) { return p.clipped > 0; });
+    only_flanks_ = std::ranges::all_of(pupils_, [](const Pupil& p) { return p.clipped; });
     for (Pupil& pupil : pupils_) {
       cut(pupil, 1.2 * reach_);
       pupil.bell.time = pupil.middle;
@@ -184,10 +184,10 @@ class Teacher {
  private:
   void align(int iteration) {
     fits_.resize(pupils_.size());
-    // The first profile is wrong: neither widths nor outliers can be told with it.
-    const BellFitOptions options{.fit_width = iteration > 0 && !only_flanks_,
+    // With the first profile, which is wrong, no widths can be told.
+    const bool fit_width = iteration > 0 && !only_flanks_;
+    const BellFitOptions options{.unknowns = fit_width ? BellUnknowns::width : BellUnknowns::basic,
                                  .log_width_sigma = 0.1,
-                                 .robust = iteration > 1,
                                  .most_iterations = 20};
     parallel_ranges(static_cast<int>(pupils_.size()), 64, [&](int begin, int end) {
       for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
@@ -319,7 +319,7 @@ class Teacher {
       const Eigen::Vector4d gradient = bell_gradient(fit.bell, learned_.profile, time);
       const double model = fit.bell.amplitude * gradient(0) + fit.bell.background;
       if (model > noise.ceiling - 3 * std::sqrt(noise.variance(model))) continue;
-      const double leverage = gradient.dot(fit.covariance * gradient) / noise.variance(model);
+      const double leverage = gradient.dot(fit.covariance.topLeftCorner<4, 4>() * gradient) / noise.variance(model);
       const double residual = pupil.gray[k] - model;
       samples.push_back({model, residual * residual / std::max(0.2, 1 - leverage)});
     }

@@ -44,9 +44,9 @@ double core_misfit(const PixelWindow& window, const Bell& bell, const PixelJudge
   double squares = 0;
   int samples = 0;
   for (std::size_t k = 0; k < window.gray.size(); ++k) {
-    const double t = (window.first_frame + static_cast<double>(k) - bell.time) / bell.width;
-    if (std::abs(t) > reach || !std::isfinite(window.gray[k])) continue;
-    const double residual = window.gray[k] - bell.amplitude * judge.profile.value(t) - bell.background;
+    const double frame = window.first_frame + static_cast<double>(k);
+    if (std::abs(frame - bell.time) > reach * bell.width || !std::isfinite(window.gray[k])) continue;
+    const double residual = window.gray[k] - bell.gray_at(frame, judge.profile);
     squares += residual * residual;
     ++samples;
   }
@@ -55,6 +55,28 @@ double core_misfit(const PixelWindow& window, const Bell& bell, const PixelJudge
 
 /// Reduced chi square beyond which noise cannot be the reason any more: four standard deviations.
 double noise_limit(const BellFit& fit) { return 1 + 4 * std::sqrt(2.0 / std::max(1, fit.samples - 3)); }
+
+/// The bell's middle part on a curved background. Half a width at half height beyond the half-height points a bell has
+/// nearly ended; a wider piece would need a more flexible background.
+BellFit fit_core(const PixelWindow& window, const BellFit& first, const PixelJudge& judge) {
+  const Bell& start = first.converged ? first.bell : window.start;
+  const double reach = 1.25 * judge.profile.full_width_half_maximum() * start.width;
+  const int size = static_cast<int>(window.gray.size());
+  const int begin = std::clamp(static_cast<int>(std::ceil(start.time - reach)) - window.first_frame, 0, size);
+  const int end = std::clamp(static_cast<int>(std::floor(start.time + reach)) + 1 - window.first_frame, begin, size);
+  return fit_bell(window.gray.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin)),
+                  window.first_frame + begin, judge.profile, judge.noise, start,
+                  {.unknowns = BellUnknowns::curved_background});
+}
+
+/// Whether a robust estimate shows the efficient one to be wrong.
+bool contradicts(const BellFit& robust, const BellFit& efficient) {
+  if (!robust.converged || robust.reduced_chi_square() > efficient.reduced_chi_square()) return false;
+  if (!efficient.converged) return true;
+  const double robust_sigma = robust.time_sigma(), efficient_sigma = efficient.time_sigma();
+  const double variance = std::max(robust_sigma * robust_sigma - efficient_sigma * efficient_sigma, 1e-12);
+  return std::abs(robust.bell.time - efficient.bell.time) > 2 * std::sqrt(variance);
+}
 
 PixelTime describe(const PixelWindow& window, const Bell& bell, double sigma, double residual,
                    const PixelJudge& judge) {
@@ -71,6 +93,9 @@ PixelTime describe(const PixelWindow& window, const Bell& bell, double sigma, do
 PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma, const PixelJudge& judge) {
   constexpr double least_recorded = 0.6, least_usable = 0.02, most_misfit = 0.1;
   if (!std::isfinite(bell.time) || !std::isfinite(sigma)) return PixelStatus::bad_fit;
+  // 0.75 times the width at half height: sum of the squared profile of any bell-like stripe.
+  const double light = 0.75 * judge.profile.full_width_half_maximum() * bell.width;
+  if (bell.amplitude < 5 * std::sqrt(judge.noise.variance(bell.background) / light)) return PixelStatus::too_dark;
   if (bell.time < 0 || bell.time > judge.frame_count - 1) return PixelStatus::truncated;
   const auto flanks = examine_flanks(window, bell, judge);
   for (const Flank& flank : flanks)
@@ -78,8 +103,8 @@ PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma
   for (const Flank& flank : flanks)
     if (flank.usable < least_usable * flank.whole)
       return flank.clipped > 0 ? PixelStatus::saturated : PixelStatus::truncated;
-  if (!(bell.amplitude >= judge.min_amplitude) || !(bell.amplitude > 0) || sigma > judge.max_sigma)
-    return PixelStatus::too_dark;
+  if (bell.amplitude < judge.min_amplitude || sigma > judge.max_sigma) return PixelStatus::too_dark;
+  if (!judge.doubt) return PixelStatus::ok;
   const double noise = std::sqrt(judge.noise.variance(bell.background + bell.amplitude));
   const double misfit = core_misfit(window, bell, judge);
   return misfit > 3 * noise && misfit > most_misfit * bell.amplitude ? PixelStatus::bad_fit : PixelStatus::ok;
@@ -147,14 +172,13 @@ PixelTime time_by_shift(const PixelWindow& window, const PixelJudge& judge) {
 
 PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge) {
   BellFit fit = fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, window.start);
-  const double chi_square = fit.reduced_chi_square(), limit = noise_limit(fit);
-  double scale = 1;
-  if (chi_square > limit) {
-    fit = fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, fit.converged ? fit.bell : window.start,
-                   {.robust = true});
-    scale = std::max(1.0, fit.reduced_chi_square() / limit);
+  const double misfit = std::sqrt(fit.reduced_chi_square());
+  if (judge.doubt && fit.reduced_chi_square() > noise_limit(fit)) {
+    const BellFit second = fit_core(window, fit, judge);
+    if (contradicts(second, fit)) fit = second;
   }
-  PixelTime result = describe(window, fit.bell, fit.time_sigma() * std::sqrt(scale), std::sqrt(chi_square), judge);
+  const double scale = std::sqrt(std::max(1.0, fit.reduced_chi_square() / noise_limit(fit)));
+  PixelTime result = describe(window, fit.bell, scale * fit.time_sigma(), misfit, judge);
   if (!fit.converged && result.status == PixelStatus::ok) result.status = PixelStatus::bad_fit;
   return result;
 }

@@ -23,6 +23,7 @@ struct PixelJudge {
   int frame_count = 0;
   double min_amplitude = 0;  ///< [gray values]
   double max_sigma = 0.5;    ///< [frames]
+  bool doubt = true;         ///< bells that do not fit are refused
 };
 
 /// Centre of mass of what rises above a fifth of the bell's height, background removed. Clipped samples count as the
@@ -32,13 +33,16 @@ PixelTime time_by_center_of_mass(const PixelWindow& window, const PixelJudge& ju
 /// Eq. 8-10 against the profile sampled at whole frames.
 PixelTime time_by_shift(const PixelWindow& window, const PixelJudge& judge);
 
-/// Maximum likelihood against the smooth profile, see fit_bell(). Where the bell does not explain all that is seen (a
-/// second hump, a glint), once more with outliers weighted down.
+/// Maximum likelihood against the smooth profile, see fit_bell(). Where the residuals are more than noise, light from
+/// elsewhere may have a part in it (a facing page, gloss): then the bell's core alone on a curved background gives a
+/// second opinion, and replaces the first where the two contradict each other (Hausman 1978: an efficient estimate is
+/// doubted when a robust one differs by more than the difference of their variances allows).
 PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge);
 
 /// What the samples say about a bell, whichever estimator found it: ok, or too_dark, truncated, saturated, bad_fit.
-/// Each flank must have been recorded for the most part and be represented by samples that are neither clipped nor
-/// dropped; samples around the middle must follow the profile to within a few percent of the height.
+/// A bell that five standard deviations of noise could have made is too dark, and so is one whose time is too
+/// uncertain. Each flank must have been recorded for the most part and be represented by samples that are neither
+/// clipped nor dropped; samples around the middle must follow the profile to within a few percent of the height.
 PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma, const PixelJudge& judge);
 
 }  // namespace pagesweep

@@ -33,7 +33,7 @@ Level robust_level(std::span<NoiseSample> bin) {
     variance = squares / kept;
     gray = grays / kept;
   }
-  return {gray, std::max(variance, 1e-6), static_cast<double>(bin.size())};
+  return {gray, std::max(variance, quantisation_variance), static_cast<double>(bin.size())};
 }
 
 /// Line through the levels; a variance scatters in proportion to itself, so the weights are samples / variance^2.

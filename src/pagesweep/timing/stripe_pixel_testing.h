@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -94,11 +95,13 @@ inline std::vector<float> expose(const Shape& shape, const Pixel& pixel, const S
 }
 
 /// Smallest standard deviation [frames] that an unbiased estimate of the pixel's time can have when amplitude and
-/// background are unknown and the clipped samples are left out.
-inline double cramer_rao_bound(const Shape& shape, const Pixel& pixel, const Sensor& sensor, int count) {
+/// background are unknown and the clipped samples and dropped frames are left out.
+inline double cramer_rao_bound(const Shape& shape, const Pixel& pixel, const Sensor& sensor, int count,
+                               const std::vector<int>& dropped = {}) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   constexpr double h = 1e-4;
   for (int i = 0; i < count; ++i) {
+    if (std::find(dropped.begin(), dropped.end(), i) != dropped.end()) continue;
     const double t = (i - pixel.time) / pixel.width;
     const double value = light(shape, pixel, i);
     if (value + sensor.black_level >= sensor.saturation - 0.5) continue;
@@ -109,22 +112,33 @@ inline double cramer_rao_bound(const Shape& shape, const Pixel& pixel, const Sen
   return std::sqrt(information.inverse()(2, 2));
 }
 
-/// Frames of a camera whose pixel (x, y) sees the stripe as pixel_at(x, y) says.
-inline Frames make_frames(int width, int height, int count, const Shape& shape, const Sensor& sensor,
-                          const std::function<Pixel(int x, int y)>& pixel_at, std::uint64_t seed = 1) {
+/// Frames of a camera, pixel (x, y) of which sees light_at(x, y, i) at frame i.
+inline Frames make_frames(int width, int height, int count, const Sensor& sensor,
+                          const std::function<double(int x, int y, int i)>& light_at, std::uint64_t seed = 1,
+                          const std::vector<int>& dropped = {}) {
   Sequence sequence{"cam", width, height, count, sensor.bit_depth, sensor.black_level, sensor.saturation};
   Frames frames(sequence);
   std::vector<Image<std::uint16_t>> images(static_cast<std::size_t>(count), Image<std::uint16_t>(width, height));
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      const Pixel pixel = pixel_at(x, y);
       const auto pixel_seed = seed * 1000003 + static_cast<std::uint64_t>(y * width + x);
       for (int i = 0; i < count; ++i)
-        images[static_cast<std::size_t>(i)](x, y) = static_cast<std::uint16_t>(
-            expose(light(shape, pixel, i), sensor, pixel_seed, static_cast<std::uint64_t>(i)));
+        images[static_cast<std::size_t>(i)](x, y) =
+            static_cast<std::uint16_t>(expose(light_at(x, y, i), sensor, pixel_seed, static_cast<std::uint64_t>(i)));
     }
-  for (int i = 0; i < count; ++i) frames.set(i, std::move(images[static_cast<std::size_t>(i)]));
+  for (int i = 0; i < count; ++i)
+    if (std::find(dropped.begin(), dropped.end(), i) == dropped.end())
+      frames.set(i, std::move(images[static_cast<std::size_t>(i)]));
   return frames;
+}
+
+/// Frames of a camera whose pixel (x, y) sees the stripe as pixel_at(x, y) says.
+inline Frames make_frames(int width, int height, int count, const Shape& shape, const Sensor& sensor,
+                          const std::function<Pixel(int x, int y)>& pixel_at, std::uint64_t seed = 1,
+                          const std::vector<int>& dropped = {}) {
+  return make_frames(
+      width, height, count, sensor, [&](int x, int y, int i) { return light(shape, pixel_at(x, y), i); }, seed,
+      dropped);
 }
 
 }  // namespace pagesweep::testing

@@ -46,7 +46,8 @@ void measure_row(RowWindows& row, const StripeProfile& profile, const SensorNois
   for (int x = y / row_step % column_step; x < width; x += column_step) {
     if (row.significance(x) < 15) continue;  // its width would be worth little
     const PixelWindow window = row.window(x, 1);
-    const BellFit fit = fit_bell(window.gray, window.first_frame, profile, noise, window.start, {.fit_width = true});
+    const BellFit fit =
+        fit_bell(window.gray, window.first_frame, profile, noise, window.start, {.unknowns = BellUnknowns::width});
     if (!fit.converged || fit.reduced_chi_square() > 100) continue;
     // What a model cannot do better than a percent does not count more for being brighter.
     const double variance = fit.covariance(3, 3) + 1e-4;
