@@ -58,7 +58,7 @@ Rgb compute(Ramp ramp, double share) {
     const auto gray = static_cast<std::uint8_t>(std::lround(255 * share));
     return {gray, gray, gray};
   }
-  if (ramp == Ramp::sequential) return strongest({16 + 76 * share, 58, 300 - 205 * share});
+  if (ramp == Ramp::sequential) return strongest({16 + 76 * share, 44 + 14 * share, 300 - 205 * share});
   const double side = 2 * share - 1;
   return strongest({95 - 55 * std::abs(side), 72 * std::pow(std::abs(side), 0.8), side < 0 ? 262.0 : 34.0});
 }

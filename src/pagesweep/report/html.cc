@@ -78,11 +78,13 @@ std::string format_number(double value) {
   if (std::abs(value) >= 1000 || value == std::round(value)) {
     std::string digits = fmt::format("{:.0f}", std::abs(value));
     if (digits.size() > 4)
-      for (std::size_t i = digits.size(); i > 3; i -= 3) digits.insert(i - 3, i > 3 && i - 3 > 0 ? "\u2009" : "");
+      for (std::size_t i = digits.size(); i > 3; i -= 3) digits.insert(i - 3, "\u2009");
     return (value < 0 ? "−" : "") + digits;
   }
   const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(std::abs(value)))), 0, 6);
-  return (value < 0 ? "−" : "") + fmt::format("{:.{}f}", std::abs(value), decimals);
+  std::string digits = fmt::format("{:.{}f}", std::abs(value), decimals);
+  if (decimals > 0) digits.erase(std::max(digits.find_last_not_of('0') + 1, digits.find('.') + 2));
+  return (value < 0 ? "−" : "") + digits;
 }
 
 std::string PictureEncoder::encode(const Picture& picture, const char* extension, int quality) const {
@@ -130,29 +132,30 @@ std::string format_figure(const PictureFigure& figure) {
 }
 
 std::string format_figures(std::span<const Figure> figures) {
-  std::string html = "<table class=\"figures\">\n", group;
+  std::string html, group;
   for (const Figure& figure : figures) {
-    if (figure.group != group || &figure == &figures.front()) {
-      std::string name = figure.group;
-      std::replace(name.begin(), name.end(), '_', ' ');
-      html += fmt::format("<tr><th colspan=\"2\">{}</th></tr>\n", escape_html(name));
+    if (figure.group != group || html.empty()) {
       group = figure.group;
+      std::string name = group;
+      std::replace(name.begin(), name.end(), '_', ' ');
+      html += html.empty() ? "" : "</table>\n";
+      html += fmt::format("<table class=\"figures\"><tr><th colspan=\"2\">{}</th></tr>\n", escape_html(name));
     }
     const std::string why =
         figure.reason.empty() ? "" : fmt::format(" <span class=\"why\">{}</span>", escape_html(figure.reason));
     html += fmt::format("<tr><td>{}{}</td><td class=\"n\">{} <span class=\"u\">{}</span></td></tr>\n",
                         escape_html(figure.what), why, format_number(figure.value), escape_html(figure.unit));
   }
-  return html + "</table>\n";
+  return html.empty() ? "" : "<div class=\"figures-columns\">" + html + "</table>\n</div>\n";
 }
 
 std::string format_profile(std::span<const ProfileSample> profile) {
   if (profile.size() < 2) return "";
-  const double width = 520, height = 220, left = 8, right = 8, top = 12, base = 190;
+  const double width = 360, height = 200, left = 10, right = 10, top = 8, base = 176;
   const double begin = profile.front().time_frames, end = profile.back().time_frames;
   if (!(end > begin)) return "";
   const auto x_of = [&](double time) { return left + (time - begin) / (end - begin) * (width - left - right); };
-  const auto y_of = [&](double light) { return base - std::clamp(light, -0.1, 1.2) * (base - top - 20); };
+  const auto y_of = [&](double light) { return base - std::clamp(light, -0.1, 1.2) * (base - top - 12); };
   std::string line;
   for (const ProfileSample& sample : profile)
     line += fmt::format("{}{:.1f} {:.1f}", line.empty() ? "M" : "L", x_of(sample.time_frames), y_of(sample.light));
@@ -160,7 +163,7 @@ std::string format_profile(std::span<const ProfileSample> profile) {
   const double step = range > 40 ? 10 : range > 16 ? 4 : range > 8 ? 2 : 1;
   std::string ticks;
   for (double t = std::ceil(begin / step) * step; t <= end; t += step)
-    ticks += fmt::format(R"(<path class="grid" d="M{0:.1f} {1}V{2}"/><text x="{0:.1f}" y="208">{3:.0f}</text>)",
+    ticks += fmt::format(R"(<path class="grid" d="M{0:.1f} {1}V{2}"/><text x="{0:.1f}" y="192">{3:.0f}</text>)",
                          x_of(t), top, base, t);
   return fmt::format(
       R"(<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="stripe profile">{}<path class="grid" d="M{} {}H{}"/>)"

@@ -20,7 +20,8 @@ std::string escape_html(std::string_view text);
 
 std::string encode_base64(std::string_view bytes);
 
-/// "12.3", "0.081", "12 345"; "–" for a missing value. Three significant digits, whole numbers in full.
+/// "12.3", "0.081", "12 345"; "–" for a missing value. Three significant digits without
+/// zeros at their end, whole numbers in full.
 std::string format_number(double value);
 
 /// Encodes pictures for embedding, through files in `folder` that are gone afterwards.
@@ -55,7 +56,7 @@ std::string format_figure(const PictureFigure& figure);
 /// A bar in a ramp's colours with the values at its ends and in its middle.
 std::string format_colour_bar(Ramp ramp, Range range, std::string_view unit);
 
-/// Rows of figures below their groups' names.
+/// A table a group, in columns; empty if there are no figures.
 std::string format_figures(std::span<const Figure> figures);
 
 /// The stripe's profile as an inline SVG; empty if there are fewer than two samples.

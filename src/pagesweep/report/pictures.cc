@@ -148,16 +148,17 @@ Picture shrink(const Picture& picture, int longest_px) {
   return small;
 }
 
-Picture crop_to_page(const Picture& scan, const ScanMap& map) {
+Picture crop_to_pages(const Picture& scan, std::span<const Page> pages) {
   double left = scan.width(), top = scan.height(), right = -1, bottom = -1;
-  for (std::size_t i = 0; i < map.u.size(); ++i) {
-    const double u = map.u.data()[i], v = map.v.data()[i];
-    if (!std::isfinite(u) || !std::isfinite(v)) continue;
-    left = std::min(left, u);
-    right = std::max(right, u);
-    top = std::min(top, v);
-    bottom = std::max(bottom, v);
-  }
+  for (const Page& page : pages)
+    for (std::size_t i = 0; i < page.scan_map.u.size(); ++i) {
+      const double u = page.scan_map.u.data()[i], v = page.scan_map.v.data()[i];
+      if (!std::isfinite(u) || !std::isfinite(v)) continue;
+      left = std::min(left, u);
+      right = std::max(right, u);
+      top = std::min(top, v);
+      bottom = std::max(bottom, v);
+    }
   const auto inside = [](double position, int size) { return static_cast<int>(std::clamp(position, 0.0, size - 1.0)); };
   if (!(right > left && bottom > top) || right < 0 || bottom < 0 || left > scan.width() || top > scan.height())
     return {};

@@ -61,7 +61,7 @@ Image<PixelStatus> shrink(const Image<PixelStatus>& status, int longest_px);
 /// Likewise, 8 bit. Keeps a colour profile, leaves other metadata behind.
 Picture shrink(const Picture& picture, int longest_px);
 
-/// The part of the scan that a page was taken from, upright as in the scan; empty if it was taken from nowhere.
-Picture crop_to_page(const Picture& scan, const ScanMap& map);
+/// The part of the scan that pages were taken from, as it is in the scan; empty if they were taken from nowhere.
+Picture crop_to_pages(const Picture& scan, std::span<const Page> pages);
 
 }  // namespace pagesweep

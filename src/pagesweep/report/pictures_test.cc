@@ -90,19 +90,20 @@ TEST(Relief, SlopesToTheLightAreBrighter) {
   EXPECT_GT(bytes(3 * 12 + 1, 20), bytes(3 * 28 + 1, 20)) << "light comes from the left";
 }
 
-TEST(CropToPage, TakesWhatTheMapNames) {
+TEST(CropToPages, TakesWhatTheMapsName) {
   Picture scan = make_picture(50, 40, 1, 8);
   std::get<0>(scan.samples)(12, 22) = 99;
-  ScanMap map(2, 2);
-  map.u(0, 0) = 12;
-  map.v(0, 0) = 22;
-  map.u(1, 1) = 30.4f;
-  map.v(1, 1) = 1e6f;
-  const Picture crop = crop_to_page(scan, map);
+  std::vector<Page> pages(2);
+  for (Page& page : pages) page.scan_map = ScanMap(2, 2);
+  pages[0].scan_map.u(0, 0) = 12;
+  pages[0].scan_map.v(0, 0) = 22;
+  pages[1].scan_map.u(1, 1) = 30.4f;
+  pages[1].scan_map.v(1, 1) = 1e6f;
+  const Picture crop = crop_to_pages(scan, pages);
   EXPECT_EQ(crop.width(), 19);
   EXPECT_EQ(crop.height(), 18);
   EXPECT_EQ(std::get<0>(crop.samples)(0, 0), 99);
-  EXPECT_EQ(crop_to_page(scan, ScanMap(3, 3)).width(), 0);
+  EXPECT_EQ(crop_to_pages(scan, std::vector<Page>(1)).width(), 0);
 }
 
 TEST(DifferenceOf, IsPositiveTowardsTheReader) {

@@ -9,7 +9,8 @@
 namespace pagesweep {
 namespace {
 
-constexpr int page_px = 1000;    // longest side of an embedded page
+constexpr int page_px = 1100;    // longest side of an embedded page
+constexpr int spread_px = 1400;  // of the scan of two of them
 constexpr int relief_px = 1000;  // of the plan of the surface
 constexpr int map_px = 520;      // of a camera's map
 
@@ -123,27 +124,25 @@ std::string format_tiles(const ReportInputs& inputs) {
 // Pages and surface ---------------------------------------------------------------------------------------------------
 
 std::string format_pages(const ReportInputs& inputs, const PictureEncoder& encoder) {
-  std::string html;
-  for (const Page& page : inputs.pages) {
-    std::string figures;
-    const Picture before = inputs.scan ? crop_to_page(*inputs.scan, page.scan_map) : Picture{};
-    if (before.width() > 0) {
-      PictureFigure figure = photo_figure(before, page_px, encoder);
-      figure.title = fmt::format("Page {} as scanned.", page.index);
-      figure.caption =
-          "The scanner sees the curved page from above: squeezed where the paper falls off towards the gutter.";
-      figures += format_figure(figure);
-    }
-    if (page.picture.width() > 0) {
-      PictureFigure figure = photo_figure(page.picture, page_px, encoder);
-      figure.title = fmt::format("Page {}, flat.", page.index);
-      figure.caption = fmt::format("True to scale, turned by {:.2f}°; {:.1f} % of it rest on measured points.",
-                                   page.deskew_rad * 180 / M_PI, 100 * page.measured_share);
-      figures += format_figure(figure);
-    }
-    html += fmt::format("<h3>Page {}</h3>\n{}", page.index, row("two", figures));
+  std::string before, after;
+  if (const Picture scan = inputs.scan ? crop_to_pages(*inputs.scan, inputs.pages) : Picture{}; scan.width() > 0) {
+    PictureFigure figure = photo_figure(scan, inputs.pages.size() > 1 ? spread_px : page_px, encoder);
+    figure.title = "As scanned.";
+    figure.caption =
+        "The scanner sees the curved paper from above: print is squeezed where the paper falls off towards the gutter.";
+    before = format_figure(figure);
   }
-  return html;
+  for (const Page& page : inputs.pages) {
+    if (page.picture.width() == 0) continue;
+    PictureFigure figure = photo_figure(page.picture, page_px, encoder);
+    figure.title = fmt::format("Page {}, flat.", page.index);
+    figure.caption =
+        fmt::format("True to scale; turned by {:.2f}° to stand upright. {:.1f} % of it rest on measured points.",
+                    page.deskew_rad * 180 / M_PI, 100 * page.measured_share);
+    after += format_figure(figure);
+  }
+  // A spread on one row and its pages on the next are to the same scale; a single page stands beside its scan.
+  return inputs.pages.size() > 1 ? row("one", before) + row("two", after) : row("two", before + after);
 }
 
 std::string format_relief(const ReportInputs& inputs, const PictureEncoder& encoder) {
@@ -172,7 +171,7 @@ std::string format_relief(const ReportInputs& inputs, const PictureEncoder& enco
     differences += format_figure(figure);
   }
   if (differences.empty()) return format_figure(relief);
-  return row("wide", format_figure(relief) + "<div class=\"row\">" + differences + "</div>");
+  return row("surface", format_figure(relief) + differences);
 }
 
 // Cameras -------------------------------------------------------------------------------------------------------------
@@ -189,7 +188,7 @@ double contour_step(Range range, int lines) {
 std::string format_times(const CameraReport& camera, const PictureEncoder& encoder) {
   if (!camera.times) return "";
   const Image<float> amplitude = shrink(camera.times->amplitude, map_px);
-  PictureFigure light = map_figure(amplitude, Ramp::gray, {0, range_of(amplitude).high}, "gray values", encoder);
+  PictureFigure light = map_figure(amplitude, Ramp::gray, {0, 1.1 * range_of(amplitude).high}, "gray values", encoder);
   light.title = camera.name + ": light.";
   light.caption = "How far the stripe rises above the background at each pixel. Dark print gives less certain times.";
 
@@ -258,7 +257,6 @@ std::string format_cameras(const ReportInputs& inputs, const PictureEncoder& enc
   for (const CameraReport& camera : inputs.cameras) {
     const std::string times = format_times(camera, encoder), points = format_points(camera, encoder);
     html += row(times.empty() || points.empty() ? "two" : "four", times + points);
-    if (!times.empty() || !points.empty()) html += "<p></p>\n";
   }
   const std::string table = format_status_table(inputs);
   std::string profile = format_profile(inputs.profile);
@@ -287,7 +285,7 @@ std::string format_details(const ReportInputs& inputs) {
   std::vector<Figure> figures = inputs.figures;
   for (const CameraReport& camera : inputs.cameras)
     figures.insert(figures.end(), camera.figures.begin(), camera.figures.end());
-  std::string html = figures.empty() ? "" : "<div class=\"figures-columns\">" + format_figures(figures) + "</div>\n";
+  std::string html = format_figures(figures);
   if (!inputs.times.empty()) {
     html += "<h3>Time taken</h3>\n<table>";
     for (const StationTime& time : inputs.times)
@@ -341,12 +339,10 @@ std::string format_evaluation(std::span<const Figure> figures, std::span<const F
     figure.caption = map.caption;
     pictures += format_figure(figure);
   }
-  const std::string table =
-      figures.empty() ? "" : "<div class=\"figures-columns\">" + format_figures(figures) + "</div>\n";
   return section("Against the truth",
                  "This capture is synthetic, so what should have been measured is known. The figures are defined in "
                  "docs/evaluation.md.",
-                 row(maps.size() > 2 ? "four" : "two", pictures) + table);
+                 row(maps.size() > 2 ? "four" : "two", pictures) + format_figures(figures));
 }
 
 }  // namespace pagesweep

@@ -59,7 +59,7 @@ struct Book {
 
   explicit Book(int camera_px = 64, int page_px = 90) : rig(sim::make_test_rig(camera_px)) {
     measure();
-    scan = printed_page(2 * page_px, page_px * 3 / 2, 0.3);
+    scan = printed_page(2 * page_px, page_px * 3 / 2, page_px / 190.0);
     for (int index = 1; index <= 2; ++index) add_page(index, page_px);
     inputs.title = "spread";
     inputs.program = "pagesweep 0.1.0";
@@ -258,6 +258,8 @@ TEST(EncodeBase64, AsInTheStandard) {
 TEST(FormatNumber, ThreeDigitsOrWhole) {
   EXPECT_EQ(format_number(0.08125), "0.0813");
   EXPECT_EQ(format_number(-12.34), "−12.3");
+  EXPECT_EQ(format_number(0.05), "0.05");
+  EXPECT_EQ(format_number(9.999), "10.0");
   EXPECT_EQ(format_number(1234567), "1\u2009234\u2009567");
   EXPECT_EQ(format_number(1234), "1234");
   EXPECT_EQ(format_number(NAN), "–");

@@ -26,16 +26,17 @@ p.lead { margin: 0 0 1.2rem; max-width: 46rem; color: var(--soft); }
 .verdict p { margin: 0; } .verdict .headline { font-size: 1.45rem; line-height: 1.35; font-weight: 600; }
 .verdict .advice { margin-top: .3rem; color: var(--level); font-weight: 600; }
 .verdict ul { margin: .8rem 0 0; padding-left: 1.1rem; color: var(--soft); } .verdict li { margin: .2rem 0; }
-.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 1px; margin: 1.4rem 0 0;
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(172px, 1fr)); gap: 1px; margin: 1.4rem 0 0;
   background: var(--line); border: 1px solid var(--line); border-radius: 8px; overflow: hidden; }
 .tiles div { padding: .8rem 1rem; background: var(--card); }
-.tiles b { display: block; font-size: 1.35rem; font-weight: 600; font-variant-numeric: tabular-nums; }
+.tiles b { display: block; white-space: nowrap; font-size: 1.22rem; font-weight: 600; font-variant-numeric: tabular-nums; }
 .tiles b small { font-size: .9rem; font-weight: 400; color: var(--soft); }
 .tiles span { color: var(--soft); font-size: .85rem; }
-.row { display: grid; gap: 1.6rem; align-items: start; }
+.row { display: grid; gap: 1.6rem; align-items: start; margin-bottom: 1.6rem; }
 .two { grid-template-columns: 1fr 1fr; } .four { grid-template-columns: repeat(4, 1fr); }
 .wide { grid-template-columns: minmax(0, 2fr) minmax(0, 1fr); }
-@media (max-width: 800px) { .two, .wide { grid-template-columns: 1fr; } .four { grid-template-columns: 1fr 1fr; } }
+.surface { grid-template-columns: minmax(0, 2.3fr) repeat(auto-fit, minmax(180px, 1fr)); }
+@media (max-width: 800px) { .two, .wide, .surface { grid-template-columns: 1fr; } .four { grid-template-columns: 1fr 1fr; } }
 figure { margin: 0; } figure img { display: block; width: 100%; height: auto; border-radius: 4px;
   border: 1px solid var(--line); background: #d6d8db; }
 figcaption { margin-top: .45rem; color: var(--soft); font-size: .88rem; line-height: 1.45; }
@@ -50,7 +51,8 @@ td, th { padding: .28rem .6rem .28rem 0; text-align: left; vertical-align: top; 
   font-weight: 400; overflow-wrap: anywhere; }
 th { color: var(--soft); font-size: .82rem; } td.n, th.n { text-align: right; font-variant-numeric: tabular-nums;
   white-space: nowrap; padding-right: 0; padding-left: .8rem; }
-table.figures th { padding-top: 1.1rem; color: var(--ink); font-weight: 600; font-size: .92rem; }
+table.figures { break-inside: avoid; margin-bottom: 1.4rem; }
+table.figures th { color: var(--ink); font-weight: 600; font-size: .92rem; }
 .figures-columns { columns: 2; column-gap: 2.4rem; margin-top: 1rem; } @media (max-width: 800px) { .figures-columns { columns: 1; } }
 .u, .why { color: var(--soft); font-size: .85em; } .u { display: inline-block; min-width: 2.9rem; text-align: left; }
 .swatch { display: inline-block; width: .8em; height: .8em; margin-right: .5em; border-radius: 2px;
