@@ -36,7 +36,7 @@ TEST(FitSensorNoise, IsNotMovedByThreePercentOfOutliers) {
 TEST(FitSensorNoise, KnowsTheFloorOfQuantisation) {
   const SensorNoise noise = fit_sensor_noise(residuals(0.001, 0.02, 0));
   EXPECT_GE(noise.read_variance, 1.0 / 12);
-  EXPECT_NEAR(noise.gain, 0.02, 0.004);  // what the floor adds in the dark is missing in the slope
+  EXPECT_NEAR(noise.gain, 0.02, 0.006);  // what the floor adds in the dark is missing in the slope
 }
 
 TEST(FitSensorNoise, LeavesTheDefaultWhereNothingIsKnown) {
