@@ -78,7 +78,7 @@ void AtomicFile::commit() {
 
 void write_bytes(const std::filesystem::path& file, std::string_view bytes) {
   AtomicFile output(file);
-  Descriptor descriptor(output.temporary(), O_WRONLY | O_TRUNC);
+  Descriptor descriptor(output.temporary(), O_WRONLY);  // not O_TRUNC, after which ext4 waits for the disk
   if (descriptor.number() < 0) throw cannot_write(file, message_of(errno));
   while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor.number(), bytes.data(), bytes.size());
