@@ -3,13 +3,17 @@
 
 #include "cli/command.h"
 #include "pagesweep/base/error.h"
-#include "pagesweep/io/rig_file.h"
 
 namespace pagesweep::cli {
 
 void CaptureInput::add_to(CLI::App& command) {
   add_input(command, "CAPTURE", capture, "folder with capture.json, or that file");
   command.add_option("--rig", rig, "use this rig instead of the one that the capture names")->option_text("<file>");
+}
+
+void CaptureInput::add_picture_to(CLI::App& command) {
+  command.add_option("--picture", picture, "use this scan instead of the one that the capture names")
+      ->option_text("<file>");
 }
 
 std::filesystem::path CaptureInput::picture_of(const Capture& opened) const {
@@ -20,10 +24,15 @@ std::filesystem::path CaptureInput::picture_of(const Capture& opened) const {
                   "alone with `pagesweep reconstruct`");
 }
 
+std::string title_of(const Capture& capture) {
+  std::error_code failure;
+  return std::filesystem::weakly_canonical(capture.folder, failure).filename().string();
+}
+
 OpenedCapture open(const CaptureInput& input) {
   OpenedCapture opened;
   opened.capture = read_capture(input.capture);
-  opened.rig = input.rig.empty() ? read_capture_rig(opened.capture) : read_rig(input.rig);
+  opened.rig = input.rig_of(opened.capture);
   opened.frames = open_capture(opened.capture, opened.rig);
   return opened;
 }

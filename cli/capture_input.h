@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "pagesweep/io/capture_file.h"
+#include "pagesweep/io/rig_file.h"
 
 namespace pagesweep::cli {
 
@@ -16,6 +17,9 @@ struct CaptureInput {
   std::filesystem::path picture;  ///< empty: likewise
 
   void add_to(CLI::App& command);
+  void add_picture_to(CLI::App& command);
+  /// The rig that belongs to `opened`.
+  Rig rig_of(const Capture& opened) const { return rig.empty() ? read_capture_rig(opened) : read_rig(rig); }
   /// The scan that belongs to `opened`.
   /// \throws Error  if there is none
   std::filesystem::path picture_of(const Capture& opened) const;
@@ -26,6 +30,9 @@ struct OpenedCapture {
   Rig rig;
   std::unique_ptr<FrameSource> frames;
 };
+
+/// Name of a capture for people: that of its folder.
+std::string title_of(const Capture& capture);
 
 /// \throws Error  if capture, rig or frames cannot be used
 OpenedCapture open(const CaptureInput& input);

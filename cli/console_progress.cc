@@ -19,7 +19,7 @@ ConsoleProgress::~ConsoleProgress() { finish(); }
 void ConsoleProgress::begin(std::string_view step) {
   throw_if_interrupted();
   const std::lock_guard lock(mutex_);
-  end_line();
+  end_step();
   step_ = step;
   begun_ = std::chrono::steady_clock::now();
   if (quiet_) return;
@@ -46,7 +46,7 @@ void ConsoleProgress::warn(std::string_view message) {
 
 void ConsoleProgress::finish() {
   const std::lock_guard lock(mutex_);
-  end_line();
+  end_step();
 }
 
 void ConsoleProgress::draw(double share) {
@@ -59,11 +59,11 @@ void ConsoleProgress::draw(double share) {
   std::fflush(stderr);
 }
 
-void ConsoleProgress::end_line() {
-  if (!step_.empty() && terminal_ && !quiet_) {
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begun_;
-    fmt::print(stderr, "\r{:40} {:.1f} s\x1b[K\n", step_, elapsed.count());
-  }
+void ConsoleProgress::end_step() {
+  if (step_.empty()) return;
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begun_;
+  times_.push_back({step_, elapsed.count()});
+  if (terminal_ && !quiet_) fmt::print(stderr, "\r{:40} {:.1f} s\x1b[K\n", step_, elapsed.count());
   step_.clear();
   drawn_percent_ = -1;
 }

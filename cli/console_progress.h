@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pagesweep/base/progress.h"
+#include "pagesweep/report/report.h"
 
 namespace pagesweep::cli {
 
@@ -24,10 +25,12 @@ class ConsoleProgress : public Progress {
   void finish();
 
   const std::vector<std::string>& warnings() const { return warnings_; }
+  /// How long each step took that has ended.
+  const std::vector<StationTime>& times() const { return times_; }
 
  private:
   void draw(double share);
-  void end_line();
+  void end_step();
 
   std::mutex mutex_;
   bool quiet_;
@@ -36,6 +39,7 @@ class ConsoleProgress : public Progress {
   std::chrono::steady_clock::time_point begun_;
   int drawn_percent_ = -1;
   std::vector<std::string> warnings_;
+  std::vector<StationTime> times_;
 };
 
 }  // namespace pagesweep::cli

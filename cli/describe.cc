@@ -11,6 +11,11 @@ namespace {
 
 constexpr double mm_per_inch = 25.4;
 
+/// "1 page", "2 pages"
+std::string count_of(const std::string& noun, std::size_t count) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
 std::vector<int> dropped_frames(const Frames& frames) {
   std::vector<int> dropped;
   for (int i = 0; i < frames.count(); ++i)
@@ -26,9 +31,10 @@ template <class... Functions>
 Overloaded(Functions...) -> Overloaded<Functions...>;
 
 std::string model_name(const Scanner& scanner) {
-  return std::visit(Overloaded{[](const Camera&) { return "brown-conrady"; }, [](const Pushbroom&) { return "pushbroom"; },
-                               [](const RotatingLine&) { return "rotating-line"; }},
-                    scanner.model());
+  return std::visit(
+      Overloaded{[](const Camera&) { return "brown-conrady"; }, [](const Pushbroom&) { return "pushbroom"; },
+                 [](const RotatingLine&) { return "rotating-line"; }},
+      scanner.model());
 }
 
 std::string model_name(const Light& light) {
@@ -38,9 +44,9 @@ std::string model_name(const Light& light) {
 Description describe_camera(const Camera& camera) {
   const Eigen::Vector3d center = camera.center();
   Description description;
-  description.lines.push_back(fmt::format("camera {}: {} x {} px, focal length {:.1f} px, at ({:.1f}, {:.1f}, {:.1f}) mm",
-                                          camera.name, camera.width, camera.height, camera.fx, center.x(), center.y(),
-                                          center.z()));
+  description.lines.push_back(
+      fmt::format("camera {}: {} x {} px, focal length {:.1f} px, at ({:.1f}, {:.1f}, {:.1f}) mm", camera.name,
+                  camera.width, camera.height, camera.fx, center.x(), center.y(), center.z()));
   description.json = {{"name", camera.name},
                       {"width", camera.width},
                       {"height", camera.height},
@@ -60,7 +66,7 @@ std::string Description::text() const { return fmt::format("{}\n", fmt::join(lin
 
 Description describe_capture(const Capture& capture, std::span<const Frames> frames) {
   Description description;
-  description.lines.push_back(fmt::format("a capture of {} cameras; every frame was read", frames.size()));
+  description.lines.push_back(fmt::format("a capture of {}; every frame was read", count_of("camera", frames.size())));
   description.json = {{"kind", "capture"}, {"notes", capture.notes}, {"sequences", nlohmann::ordered_json::array()}};
   for (const Frames& of_camera : frames) {
     const Sequence& sequence = of_camera.sequence();
@@ -83,7 +89,7 @@ Description describe_capture(const Capture& capture, std::span<const Frames> fra
 
 Description describe_rig(const Rig& rig) {
   Description description;
-  description.lines.push_back(fmt::format("a rig of {} cameras", rig.cameras.size()));
+  description.lines.push_back("a rig of " + count_of("camera", rig.cameras.size()));
   description.json = {{"kind", "rig"}, {"cameras", nlohmann::ordered_json::array()}};
   for (const Camera& camera : rig.cameras) {
     const Description part = describe_camera(camera);
@@ -115,7 +121,8 @@ Description describe_picture(const std::filesystem::path& file, const Picture& p
   Description description;
   description.lines.push_back(fmt::format("{}: a picture, {} x {} px, {} {} bit, {}{}", file.filename().string(),
                                           picture.width(), picture.height(), picture.channels == 1 ? "gray" : "RGB",
-                                          picture.bit_depth(), dpi > 0 ? fmt::format("{:.1f} dpi", dpi) : "of unknown scale",
+                                          picture.bit_depth(),
+                                          dpi > 0 ? fmt::format("{:.1f} dpi", dpi) : "of unknown scale",
                                           picture.icc_profile.empty() ? "" : ", with a colour profile"));
   description.json = {{"kind", "picture"},
                       {"width", picture.width()},
@@ -130,7 +137,7 @@ Description describe_points(const PointCloud& cloud) {
   Eigen::AlignedBox3f box;
   for (const auto& point : cloud.points) box.extend(point);
   Description description;
-  description.lines.push_back(fmt::format("a point cloud of {} points", cloud.size()));
+  description.lines.push_back("a point cloud of " + count_of("point", cloud.size()));
   description.json = {{"kind", "points"}, {"count", cloud.size()}};
   if (!box.isEmpty()) {
     const auto &low = box.min(), &high = box.max();
@@ -144,13 +151,23 @@ Description describe_points(const PointCloud& cloud) {
 
 Description describe_truth(const Truth& truth) {
   Description description;
-  description.lines.push_back(fmt::format("reference data of a synthetic capture with {} pages", truth.pages.size()));
+  description.lines.push_back("reference data of a synthetic capture of " + count_of("page", truth.pages.size()));
   description.json = {{"kind", "truth"}, {"pages", nlohmann::ordered_json::array()}};
   for (const TruthPage& page : truth.pages) {
     description.lines.push_back(fmt::format("  page {}: {:.1f} dpi{}", page.index, page.pixels_per_mm * mm_per_inch,
                                             page.text.empty() ? "" : ", its text in " + page.text));
     description.json["pages"].push_back({{"index", page.index}, {"pixels_per_mm", page.pixels_per_mm}});
   }
+  return description;
+}
+
+Description describe_report(const JsonReader& report) {
+  Description description;
+  description.lines.push_back("a result: " + report.at("verdict").at("headline").text());
+  description.lines.push_back("  " + report.at("verdict").at("advice").text());
+  description.json = {{"kind", "result"},
+                      {"headline", report.at("verdict").at("headline").text()},
+                      {"advice", report.at("verdict").at("advice").text()}};
   return description;
 }
 

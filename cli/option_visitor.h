@@ -14,8 +14,8 @@
 
 namespace pagesweep::cli {
 
-/// Turns an options struct that describes itself (base/options.h) into options of a command: a name, the unit in place of
-/// the value, the help text and the default come from the struct alone.
+/// Turns an options struct that describes itself (base/options.h) into options of a command: a name, the unit in place
+/// of the value, the help text and the default come from the struct alone.
 class OptionVisitor {
  public:
   /// \param group  heading of these options in the help
@@ -35,7 +35,8 @@ class OptionVisitor {
     requires std::is_arithmetic_v<Number>
   void operator()(std::string_view name, Number& field, std::string_view unit, std::string_view help) {
     add(name, field, unit.empty() ? "<number>" : fmt::format("<{}>", unit), help, fmt::format("{}", field))
-        ->check([](const std::string& text) { return std::isfinite(std::stod(text)) ? "" : "is no finite number"; }, "");
+        ->check([](const std::string& text) { return std::isfinite(std::stod(text)) ? "" : "is no finite number"; },
+                "");
   }
 
   template <class Enum>
@@ -46,11 +47,13 @@ class OptionVisitor {
       if (value) field = *value;
       return value.has_value();
     };
-    command_.add_option(fmt::format("--{}", name), [choose, name = std::string(name)](const CLI::results_t& texts) {
-      if (choose(texts.back())) return true;
-      throw CLI::ValidationError("--" + name, fmt::format("'{}' is none of {}", texts.back(),
-                                                          fmt::join(names_of(Enum{}), ", ")));
-    })
+    command_
+        .add_option(fmt::format("--{}", name),
+                    [choose, name = std::string(name)](const CLI::results_t& texts) {
+                      if (choose(texts.back())) return true;
+                      throw CLI::ValidationError("--" + name, fmt::format("'{}' is none of {}", texts.back(),
+                                                                          fmt::join(names_of(Enum{}), ", ")));
+                    })
         ->group(group_)
         ->option_text("<name>")
         ->description(fmt::format("{}: {} [{}]", help, fmt::join(names_of(Enum{}), ", "), name_of(field)));

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/result_output.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "pagesweep/io/atomic_file.h"
+
+namespace pagesweep::cli {
+namespace {
+
+constexpr std::size_t most_report_bytes = 64 << 20;
+constexpr int profile_samples = 81;
+
+std::vector<ProfileSample> sample(const StripeProfile& profile) {
+  std::vector<ProfileSample> samples;
+  for (int i = 0; i < profile_samples; ++i) {
+    const double time = profile.begin() + (profile.end() - profile.begin()) * i / (profile_samples - 1);
+    samples.push_back({time, profile.value(time)});
+  }
+  return samples;
+}
+
+std::vector<Figure> figures_of(const SensorNoise& noise, const std::string& camera) {
+  return {
+      {camera, "read_noise", "noise of the sensor without light", std::sqrt(noise.read_variance), "gray values", ""},
+      {camera, "gain", "gray values a photoelectron", noise.gain, "gray values", ""}};
+}
+
+std::vector<CameraReport> cameras_of(const RunResult& result) {
+  const Measurement& measurement = result.measurement;
+  std::vector<CameraReport> cameras;
+  for (std::size_t c = 0; c < measurement.cameras.size(); ++c) {
+    CameraReport camera;
+    camera.name = measurement.cameras[c].name;
+    camera.points = &measurement.points[c];
+    camera.dropped = measurement.dropped_frames[c];
+    if (c < result.sequences.size()) camera.frames = result.sequences[c].count;
+    if (measurement.timing) {
+      camera.times = &measurement.timing->maps[c];
+      camera.figures = figures_of(measurement.timing->noise[c], camera.name);
+    }
+    cameras.push_back(std::move(camera));
+  }
+  return cameras;
+}
+
+ReportInputs inputs_of(const RunResult& result, const ConsoleProgress& progress) {
+  ReportInputs inputs;
+  inputs.title = result.title;
+  inputs.program = "pagesweep " PAGESWEEP_VERSION;
+  inputs.cameras = cameras_of(result);
+  if (const auto& timing = result.measurement.timing) {
+    inputs.profile = sample(timing->profile);
+    inputs.figures.push_back({"stripe", "fwhm", "duration of the stripe at one spot, at half its height",
+                              timing->profile.full_width_half_maximum(), "frames", ""});
+  }
+  inputs.surfaces = result.surfaces;
+  inputs.pages = result.pages;
+  inputs.scan = result.scan;
+  inputs.pages_expected = result.scan != nullptr;
+  inputs.options = result.options;
+  inputs.times = progress.times();
+  inputs.warnings = progress.warnings();
+  return inputs;
+}
+
+std::string summary(const OutputFolder& output, const Verdict& verdict) {
+  std::string text = verdict.headline + "\n" + verdict.advice + "\n";
+  for (const auto& remark : verdict.remarks) text += "  " + remark + "\n";
+  return text + "Report: " + (output.path() / "report.html").string() + "\n";
+}
+
+}  // namespace
+
+void add_measuring_options(std::vector<OptionValue>& values, const ScanOptions& options) {
+  values.push_back({"matching", "matcher", std::string(name_of(options.matcher)), ""});
+  add_options(values, "timing", options.timing);
+  add_options(values, "matching", options.matching);
+  add_options(values, "triangulation", options.triangulation);
+}
+
+void add_flattening_options(std::vector<OptionValue>& values, const ScanOptions& options) {
+  add_options(values, "surfacing", options.surface);
+  add_options(values, "dewarping", options.dewarp);
+}
+
+void finish_result(OutputFolder& output, const RunResult& result, ConsoleProgress& progress,
+                   const CommonOptions& options) {
+  progress.finish();
+  const ReportInputs inputs = inputs_of(result, progress);
+  write_report(output.path(), inputs);
+  output.finish();
+  const std::string report = read_bytes(output.path() / "report.json", most_report_bytes);
+  print_answer(options, nlohmann::ordered_json::parse(report), summary(output, judge(inputs)));
+}
+
+}  // namespace pagesweep::cli

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cli/command.h"
+#include "cli/console_progress.h"
+#include "cli/output_folder.h"
+#include "pagesweep/pipeline/scan_page.h"
+#include "pagesweep/report/report.h"
+
+namespace pagesweep::cli {
+
+/// What a finished run can tell. What it has not is left empty.
+struct RunResult {
+  std::string title;
+  std::vector<Sequence> sequences;  ///< of the cameras, if frames were read
+  const Measurement& measurement;
+  std::span<const PageSurface> surfaces = {};
+  std::span<const Page> pages = {};
+  const Picture* scan = nullptr;
+  std::vector<OptionValue> options = {};
+};
+
+/// The options of the measuring stations, and those of the flattening ones, as they were used.
+void add_measuring_options(std::vector<OptionValue>& values, const ScanOptions& options);
+void add_flattening_options(std::vector<OptionValue>& values, const ScanOptions& options);
+
+/// Writes the report, which completes the output folder, and answers with what it says.
+void finish_result(OutputFolder& output, const RunResult& result, ConsoleProgress& progress,
+                   const CommonOptions& options);
+
+}  // namespace pagesweep::cli

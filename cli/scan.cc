@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// pagesweep scan: the whole way, from a capture to flat pages.
+#include "cli/capture_input.h"
+#include "cli/command.h"
+#include "cli/console_progress.h"
+#include "cli/option_visitor.h"
+#include "cli/output_folder.h"
+#include "cli/result_output.h"
+#include "pagesweep/base/parallel.h"
+#include "pagesweep/io/image_file.h"
+#include "pagesweep/pipeline/results.h"
+
+namespace pagesweep::cli {
+namespace {
+
+struct Arguments {
+  CommonOptions common;
+  CaptureInput input;
+  std::filesystem::path output;
+  ScanOptions options;
+  PageFileOptions files;
+};
+
+void run(const Arguments& arguments) {
+  const ThreadLimit limit(arguments.common.threads);
+  ConsoleProgress progress(arguments.common.quiet);
+  OutputFolder output(arguments.output, "report.json");
+  const OpenedCapture opened = open(arguments.input);
+  const Picture picture = read_picture(arguments.input.picture_of(opened.capture));
+  const Scan scan = scan_page(*opened.frames, picture, opened.rig, arguments.options, progress);
+
+  progress.begin("writing the pages");
+  output.begin();
+  write_measurement(output.path(), scan.measurement);
+  write_pages(output.path(), scan.pages, scan.surfaces, arguments.files);
+  RunResult result{.title = title_of(opened.capture),
+                   .sequences = opened.frames->sequences(),
+                   .measurement = scan.measurement,
+                   .surfaces = scan.surfaces,
+                   .pages = scan.pages,
+                   .scan = &picture};
+  add_measuring_options(result.options, arguments.options);
+  add_flattening_options(result.options, arguments.options);
+  finish_result(output, result, progress, arguments.common);
+}
+
+}  // namespace
+
+void add_scan_command(CLI::App& app) {
+  auto* command = app.add_subcommand("scan", R"(Measure the pages of a book and flatten them: the whole way.
+
+Reads a capture (the frames of both cameras, the scanner's picture and the rig) and writes
+
+  page_1.png, page_2.png   the flat pages from left to right, true to scale
+  points.ply               the measured surface, for CloudCompare or MeshLab
+  report.html              how well it was measured, and why anything is missing; report.json for programs
+  page_N_scanmap.tiff      where in the scan each pixel of page N was taken from
+  page_N_surface.tiff      the page's shape
+  CAMERA_*.tiff            per camera pixel: point, standard deviation, time, reason why it has none
+)");
+  const auto arguments = std::make_shared<Arguments>();
+  arguments->input.add_to(*command);
+  arguments->input.add_picture_to(*command);
+  add_output(*command, arguments->output, "where the result goes");
+  arguments->options.describe_measurement(OptionVisitor(*command, "Measuring"));
+  arguments->options.describe_pages(OptionVisitor(*command, "Flattening"));
+  arguments->files.describe(OptionVisitor(*command, "Files"));
+  add_common_options(*command, arguments->common);
+  command->footer(R"(Examples:
+  pagesweep scan capture -o result
+  pagesweep scan capture -o result --dpi 400 --format tiff
+  pagesweep scan capture -o plain --no-difference-vector      # the surface model alone, to see what dents do
+)");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pagesweep::cli
