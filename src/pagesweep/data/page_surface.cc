@@ -2,8 +2,9 @@
 #include "pagesweep/data/page_surface.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "pagesweep/base/catmull_rom.h"
 
 namespace pagesweep {
 namespace {
@@ -25,12 +26,6 @@ Eigen::Vector3d node(const Image<Eigen::Vector3f>& nodes, int i, int j) {
   return at + std::abs(j - inside) * (at - along_row(j < 0 ? 1 : last - 1));
 }
 
-/// Catmull-Rom weights for the nodes at -1, 0, 1, 2 around a position at 0 <= x < 1.
-std::array<double, 4> catmull_rom(double x) {
-  return {x * (-0.5 + x * (1 - 0.5 * x)), 1 + x * x * (-2.5 + 1.5 * x), x * (0.5 + x * (2 - 1.5 * x)),
-          x * x * (-0.5 + 0.5 * x)};
-}
-
 }  // namespace
 
 Eigen::Vector3d interpolate(const PageSurface& surface, const Image<Eigen::Vector3f>& nodes, double s_mm, double t_mm) {
@@ -44,8 +39,8 @@ Eigen::Vector3d interpolate(const PageSurface& surface, const Image<Eigen::Vecto
   // Beyond the outermost extrapolated cell the interpolant goes on as a straight line.
   const double di = std::clamp(i - i0, 0.0, 1.0);
   const double dj = std::clamp(j - j0, 0.0, 1.0);
-  const auto wi = catmull_rom(di);
-  const auto wj = catmull_rom(dj);
+  const auto wi = catmull_rom_weights(di);
+  const auto wj = catmull_rom_weights(dj);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (int b = 0; b < 4; ++b)
     for (int a = 0; a < 4; ++a)
