@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "pagesweep/dewarping/printed_page_internal.h"
+#include "pagesweep/dewarping/printed_page_testing.h"
 #include "pagesweep/dewarping/resample.h"
 
 namespace pagesweep {

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "pagesweep/base/parallel.h"
-#include "pagesweep/dewarping/printed_page_internal.h"
+#include "pagesweep/dewarping/printed_page_testing.h"
 
 namespace pagesweep {
 namespace {

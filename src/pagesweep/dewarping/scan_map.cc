@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "pagesweep/base/catmull_rom.h"
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
 
@@ -15,12 +16,6 @@ namespace pagesweep {
 namespace {
 
 using Weights = std::array<double, 4>;
-
-/// Weights of the lattice nodes at -1, 0, 1, 2 for a position x between 0 and 1.
-Weights catmull_rom(double x) {
-  return {x * (-0.5 + x * (1 - 0.5 * x)), 1 + x * x * (-2.5 + 1.5 * x), x * (0.5 + x * (2 - 1.5 * x)),
-          x * x * (-0.5 + 0.5 * x)};
-}
 
 /// Positions in the scan at every `pitch`-th pixel of the page and one node around it.
 class Lattice {
@@ -49,7 +44,8 @@ class Lattice {
         if (!nodes_(i + a, j + b).allFinite()) return false;
     if (!seen_(i + 1, j + 1) || !seen_(i + 2, j + 1) || !seen_(i + 1, j + 2) || !seen_(i + 2, j + 2)) return false;
     const auto middle = see((i + 0.5) * pitch_, (j + 0.5) * pitch_);
-    return middle && (interpolate_at(i, j, catmull_rom(0.5), catmull_rom(0.5)) - *middle).norm() <= tolerance_px;
+    return middle &&
+           (interpolate_at(i, j, catmull_rom_weights(0.5), catmull_rom_weights(0.5)) - *middle).norm() <= tolerance_px;
   }
 
   Eigen::Vector2d interpolate_at(int i, int j, const Weights& wx, const Weights& wy) const {
@@ -131,7 +127,7 @@ ScanMap build_scan_map(const PaperView& view, const Occlusion& occlusion, const 
     throw std::invalid_argument("build_scan_map: pixels_per_mm and tolerance_px must be positive");
   const Lattice lattice(view, occlusion, frame, pixels_per_mm);
   std::vector<Weights> weights;
-  for (int k = 0; k < lattice.pitch(); ++k) weights.push_back(catmull_rom(double(k) / lattice.pitch()));
+  for (int k = 0; k < lattice.pitch(); ++k) weights.push_back(catmull_rom_weights(double(k) / lattice.pitch()));
   ScanMap map(frame.width_px(pixels_per_mm), frame.height_px(pixels_per_mm));
   parallel_rows(lattice.rows(), [&](int j) {
     for (int i = 0; i < lattice.columns(); ++i) fill_cell(lattice, i, j, tolerance_px, weights, map);
