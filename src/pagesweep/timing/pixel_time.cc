@@ -92,6 +92,7 @@ PixelTime describe(const PixelWindow& window, const Bell& bell, double sigma, do
 
 PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma, const PixelJudge& judge) {
   constexpr double least_recorded = 0.6, least_usable = 0.02, most_misfit = 0.1;
+  constexpr double least_amplitude = 3;  // [gray values] below that, rounding makes the shape
   if (!std::isfinite(bell.time) || !std::isfinite(sigma)) return PixelStatus::bad_fit;
   // 0.75 times the width at half height: sum of the squared profile of any bell-like stripe.
   const double light = 0.75 * judge.profile.full_width_half_maximum() * bell.width;
@@ -103,7 +104,8 @@ PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma
   for (const Flank& flank : flanks)
     if (flank.usable < least_usable * flank.whole)
       return flank.clipped > 0 ? PixelStatus::saturated : PixelStatus::truncated;
-  if (bell.amplitude < judge.min_amplitude || sigma > judge.max_sigma) return PixelStatus::too_dark;
+  if (bell.amplitude < std::max(judge.min_amplitude, least_amplitude) || sigma > judge.max_sigma)
+    return PixelStatus::too_dark;
   if (!judge.doubt) return PixelStatus::ok;
   const double noise = std::sqrt(judge.noise.variance(bell.background + bell.amplitude));
   const double misfit = core_misfit(window, bell, judge);
@@ -143,6 +145,7 @@ PixelTime time_by_center_of_mass(const PixelWindow& window, const PixelJudge& ju
     }
     if (!(mass > 0)) return {};
   }
+  bell.time -= judge.profile.upper_centre() * bell.width;
   return describe(window, bell, std::sqrt(scatter), 1, judge);
 }
 

@@ -74,20 +74,23 @@ void StripeProfile::set_coefficients(std::span<const double> c) {
 }
 
 void StripeProfile::normalise() {
-  constexpr int fine = 16;  // samples a knot: the height is then exact to the sixth digit
   double height = 0;
-  const int samples = fine * static_cast<int>(pieces_.size());
-  const auto time_of = [&](int i) { return begin_ + (i + 0.5) * spacing_ / fine; };
-  for (int i = 0; i < samples; ++i) height = std::max(height, value(time_of(i)));
+  for (double t = begin(); t < end(); t += spacing_ / 16) height = std::max(height, value(t));
   if (!(height > 0) || !std::isfinite(height)) throw std::invalid_argument("StripeProfile::fit: nothing rises above 0");
   for (Piece& p : pieces_) p = {p.c0 / height, p.c1 / height, p.c2 / height, p.c3 / height};
+  begin_ -= centre_above(0);
+  upper_centre_ = centre_above(centre_threshold);
+}
+
+double StripeProfile::centre_above(double threshold) const {
+  const double step = spacing_ / 16;
   double mass = 0, moment = 0;
-  for (int i = 0; i < samples; ++i) {
-    const double above = std::max(0.0, value(time_of(i)) - centre_threshold);
+  for (double t = begin() + 0.5 * step; t < end(); t += step) {
+    const double above = std::max(0.0, value(t) - threshold);
     mass += above;
-    moment += above * time_of(i);
+    moment += above * t;
   }
-  begin_ -= moment / mass;
+  return moment / mass;
 }
 
 void StripeProfile::measure_width() {

@@ -10,8 +10,7 @@ namespace pagesweep {
 /// differentiable). Its height is 1, it is 0 outside its support, and no shape is assumed: it may be skewed or
 /// flat-topped.
 ///
-/// Its time origin, to which all time values refer, is the centre of mass of what rises above a fifth of the height: a
-/// centre that weak and noisy tails do not move.
+/// Its time origin, to which all time values refer, is its centre of mass.
 class StripeProfile {
  public:
   /// Height and slope [1/frame] at one moment.
@@ -38,6 +37,9 @@ class StripeProfile {
 
   double begin() const { return begin_; }  ///< [frames] of the support
   double end() const { return begin_ + spacing_ * static_cast<double>(pieces_.size()); }
+  /// Centre of mass of what rises above a fifth of the height [frames]: what the centre-of-mass estimator finds,
+  /// because it must keep away from noisy tails. 0 for a symmetric stripe.
+  double upper_centre() const { return upper_centre_; }
   bool empty() const { return pieces_.empty(); }
   /// Duration between the two moments at half height [frames].
   double full_width_half_maximum() const { return fwhm_; }
@@ -60,6 +62,7 @@ class StripeProfile {
   };
   void set_coefficients(std::span<const double> coefficients);
   void normalise();
+  double centre_above(double threshold) const;
   void measure_width();
 
   double begin_ = 0;
@@ -67,11 +70,11 @@ class StripeProfile {
   double knots_per_frame_ = 1;
   double count_ = 0;
   double fwhm_ = 0;
+  double upper_centre_ = 0;
   std::vector<Piece> pieces_;
 };
 
-/// Centre of mass of what rises above a fifth of the highest value; `value_at` is sampled at begin, begin + step, ...
-/// This is the origin of every stripe profile and what the centre-of-mass estimator measures.
+/// Share of a bell's height that the centre-of-mass estimator leaves out, see StripeProfile::upper_centre().
 inline constexpr double centre_threshold = 0.2;
 
 }  // namespace pagesweep

@@ -37,14 +37,17 @@ TEST(StripeProfile, IsTwiceContinuouslyDifferentiable) {
   }
 }
 
-TEST(StripeProfile, HasItsOriginAtTheCentreOfWhatRisesAboveAFifth) {
+TEST(StripeProfile, HasItsOriginAtItsCentreOfMass) {
   const auto profile = StripeProfile::fit(points_of(testing::skewed(2, 5), -10, 20), -10, 20, 0.4);
-  double mass = 0, moment = 0;
+  double mass = 0, moment = 0, upper_mass = 0, upper_moment = 0;
   for (double t = -20; t < 20; t += 0.001) {
-    const double above = std::max(0.0, profile.value(t) - 0.2);
-    mass += above, moment += above * t;
+    const double value = profile.value(t), above = std::max(0.0, value - 0.2);
+    mass += value, moment += value * t;
+    upper_mass += above, upper_moment += above * t;
   }
   EXPECT_NEAR(moment / mass, 0, 1e-3);
+  EXPECT_NEAR(profile.upper_centre(), upper_moment / upper_mass, 1e-3);
+  EXPECT_LT(profile.upper_centre(), -0.05);  // its tail is behind
 }
 
 TEST(StripeProfile, BridgesAGapSmoothly) {
