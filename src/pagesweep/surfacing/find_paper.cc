@@ -80,7 +80,7 @@ class Pieces {
       : field_(field), measured_(measured), bright_(bright), label_(field.columns(), field.rows(), -1) {
     for (int j = 0; j < field.rows(); ++j)
       for (int i = 0; i < field.columns(); ++i)
-        if (measured(i, j) && label_(i, j) < 0) grow(i, j);
+        if (label_(i, j) < 0 && is_inner(i, j)) grow(i, j);
   }
 
   Image<std::uint8_t> choose_paper() {
@@ -92,14 +92,50 @@ class Pieces {
     Image<std::uint8_t> paper(field_.columns(), field_.rows(), 0);
     for (const Piece& piece : pieces_)
       for (const int k : piece.cells) paper.data()[k] = piece.paper;
-    return paper;
+    return with_edges(paper);
   }
 
  private:
   static constexpr std::array<std::pair<int, int>, 4> neighbours{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
 
+  /// Whether the surface goes on from one cell to its neighbour: the height between them changes as the slope on either
+  /// side says, or as both together do.
   bool joined(int i, int j, int i2, int j2) const {
-    return std::abs(field_.z(i, j) - field_.z(i2, j2)) < std::max(step_mm, steepest * field_.cell_mm);
+    const Image<float>& slopes = i == i2 ? field_.slope_q : field_.slope_p;
+    const double distance_mm = (i2 - i + j2 - j) * field_.cell_mm;
+    const double rise = field_.z(i2, j2) - field_.z(i, j);
+    const double here = std::clamp<double>(slopes(i, j), -steepest, steepest);
+    const double there = std::clamp<double>(slopes(i2, j2), -steepest, steepest);
+    return std::ranges::any_of(std::array{here, 0.5 * (here + there), there},
+                               [&](double slope) { return std::abs(rise - slope * distance_mm) < step_mm; });
+  }
+
+  /// Whether the fitted height is that of the cell's own points; the corner of an edge may be fitted as a ramp.
+  bool is_fitted_well(int i, int j) const {
+    const CellMean& cell = field_.cells(i, j);
+    const double height = field_.z(i, j) + field_.slope_p(i, j) * cell.p + field_.slope_q(i, j) * cell.q;
+    return cell.count == 0 || std::abs(cell.z - height) < 0.5 * step_mm;
+  }
+
+  /// Whether the surface goes on to all sides that are measured. Pieces grow through such cells only: a few cells of
+  /// middling height along an edge would connect what lies on either side of it.
+  bool is_inner(int i, int j) const {
+    return measured_(i, j) && is_fitted_well(i, j) && std::ranges::all_of(neighbours, [&](const auto& step) {
+             const int i2 = i + step.first, j2 = j + step.second;
+             return !measured_.contains(i2, j2) || !measured_(i2, j2) || joined(i, j, i2, j2);
+           });
+  }
+
+  /// The paper and the cells at its edge that go on from it.
+  Image<std::uint8_t> with_edges(const Image<std::uint8_t>& paper) const {
+    Image<std::uint8_t> whole = paper;
+    for (int j = 0; j < field_.rows(); ++j)
+      for (int i = 0; i < field_.columns(); ++i) {
+        if (!measured_(i, j) || label_(i, j) >= 0) continue;
+        for (const auto& [di, dj] : neighbours)
+          if (paper.contains(i + di, j + dj) && paper(i + di, j + dj) && joined(i, j, i + di, j + dj)) whole(i, j) = 1;
+      }
+    return whole;
   }
 
   void grow(int i0, int j0) {
@@ -114,7 +150,7 @@ class Pieces {
       heights.push_back(field_.z(i, j));
       for (const auto& [di, dj] : neighbours) {
         const int i2 = i + di, j2 = j + dj;
-        if (!measured_.contains(i2, j2) || !measured_(i2, j2) || label_(i2, j2) >= 0) continue;
+        if (!measured_.contains(i2, j2) || label_(i2, j2) >= 0 || !is_inner(i2, j2)) continue;
         if ((bright_(i2, j2) != 0) != piece.bright || !joined(i, j, i2, j2)) continue;
         label_(i2, j2) = number;
         piece.cells.push_back(j2 * field_.columns() + i2);
@@ -152,10 +188,11 @@ class Pieces {
       const int i = k % field_.columns(), j = k / field_.columns();
       for (const auto& [di, dj] : neighbours) {
         const int i2 = i + 3 * di, j2 = j + 3 * dj;  // a cell on the edge itself sees both sides
-        const int other = label_.contains(i2, j2) ? label_(i2, j2) : -1;
+        const bool beyond = !label_.contains(i2, j2) || !measured_(i2, j2);
+        const int other = beyond ? -1 : label_(i2, j2);
         if (other == label_(i, j)) continue;
         ++rim;
-        if (other < 0) ++outside;
+        if (beyond) ++outside;
         if (other >= 0 && pieces_[static_cast<std::size_t>(other)].paper)
           drops.push_back(field_.z(i2, j2) - field_.z(i, j));
       }
@@ -185,7 +222,7 @@ class Pieces {
           j0 = std::min(j0, j);
           j1 = std::max(j1, j);
         }
-    std::vector<char> left(label_.data() ? static_cast<std::size_t>(field_.rows()) : 0, 0), right = left;
+    std::vector<char> left(static_cast<std::size_t>(field_.rows()), 0), right = left;
     std::vector<char> below(static_cast<std::size_t>(field_.columns()), 0), above = below;
     for (const int k : piece.cells) {
       const int i = k % field_.columns(), j = k / field_.columns();

@@ -16,12 +16,6 @@ using scenes::measure;
 const double nan = std::numeric_limits<double>::quiet_NaN();
 const Eigen::Vector2d no_paper(nan, nan);
 
-/// Prints and checks nothing by itself.
-void show(const char* what, const scenes::FlatteningError& e) {
-  printf("%-28s rms %.4f max %.4f scale-1 %.2e turn %.5f nodes %d\n", what, e.rms_mm, e.largest_mm, e.scale - 1,
-         e.turn_rad, e.nodes);
-}
-
 void expect_book(const std::vector<PageSurface>& pages, const scenes::OpenBook& book) {
   ASSERT_EQ(pages.size(), 2u);
   for (const PageSurface& page : pages) {
@@ -29,12 +23,11 @@ void expect_book(const std::vector<PageSurface>& pages, const scenes::OpenBook& 
     const auto paper = [&](double x, double y) { return book.paper(x, y, side); };
     const auto model = flattening_error(page, page.model, paper);
     const auto measured = flattening_error(page, page.measured, paper);
-    show("book model", model);
-    show("book measured", measured);
     EXPECT_GT(model.nodes, 5000);
-    // Half of the 0.1 mm that the whole way is to keep.
-    EXPECT_LT(model.rms_mm, 0.05);
-    EXPECT_LT(measured.rms_mm, 0.05);
+    // 0.08 mm of noise a point, some hundred points a neighbourhood, seen under 20 degrees: 0.003 mm in the paper; at
+    // the gutter and the outer edges a few times that.
+    EXPECT_LT(model.rms_mm, 0.01);
+    EXPECT_LT(measured.rms_mm, 0.015);
     EXPECT_NEAR(model.scale, 1, 5e-4);
     EXPECT_EQ(page.gutter_at_left, side > 0);
     EXPECT_EQ(page.gutter_at_right, side < 0);
@@ -71,7 +64,6 @@ TEST(FitSurface, LaysAPlaneFlatExactly) {
     const Eigen::Vector3d point(x, y, 0.12 * x - 0.07 * y);
     return {point.dot(across), -point.dot(up)};
   });
-  show("plane", error);
   EXPECT_LT(error.largest_mm, 0.02);
   EXPECT_NEAR(error.scale, 1, 2e-5);
   double worst = 0;
@@ -80,7 +72,6 @@ TEST(FitSurface, LaysAPlaneFlatExactly) {
       const Eigen::Vector3f p = page.model(i, j);
       worst = std::max(worst, std::abs(p.z() - 30 - 0.12 * p.x() + 0.07 * p.y()));
     }
-  printf("plane worst height %.4f\n", worst);
   EXPECT_LT(worst, 0.05) << "8 mm of extrapolation included";
 }
 
@@ -95,7 +86,6 @@ TEST(FitSurface, KnowsTheArcLengthOfACylinder) {
     if (std::isnan(height(x, y))) return no_paper;
     return {radius * std::asin(x / radius), -y};
   });
-  show("cylinder", error);
   EXPECT_LT(error.largest_mm, 0.03);
 }
 
@@ -129,10 +119,51 @@ TEST(FitSurface, UnrollsACone) {
     const auto pages = fit_surface(points, {.model = model});
     ASSERT_EQ(pages.size(), 1u);
     const auto error = flattening_error(pages[0], pages[0].model, Cone::paper);
-    show("cone", error);
     EXPECT_LT(error.rms_mm, 0.05);
     EXPECT_NEAR(error.scale, 1, 5e-4);
   }
+}
+
+/// A sheet whose right corners both curl up: cylinders of 80 mm radius about lines that run diagonally, one against the
+/// other, which no ruled surface with rulings in one direction can be.
+struct CurledCorners {
+  static constexpr double radius = 80, begin = 66;
+  static double beyond(double x, double y) { return std::max(0.0, (x + std::abs(y)) / std::numbers::sqrt2 - begin); }
+  static double height(double x, double y) {
+    const double d = beyond(x, y);
+    if (!(std::abs(x) < 90 && std::abs(y) < 110) || d > 0.65 * radius) return nan;
+    return 10 + radius - std::sqrt(radius * radius - d * d);
+  }
+  static Eigen::Vector2d paper(double x, double y) {
+    if (std::isnan(height(x, y))) return no_paper;
+    const double d = beyond(x, y), longer = (radius * std::asin(d / radius) - d) / std::numbers::sqrt2;
+    return {x + longer, -(y + std::copysign(longer, y))};
+  }
+};
+
+TEST(FitSurface, LaysFlatByTheMeasurementWhatNoModelDescribes) {
+  const auto points = measure({CurledCorners::height, 60, 0});
+  const auto model = fit_surface(points, {.model = SurfaceModel::cylinder, .layout = Layout::single});
+  const auto free = fit_surface(points, {.model = SurfaceModel::developable, .layout = Layout::single});
+  ASSERT_EQ(model.size(), 1u);
+  ASSERT_EQ(free.size(), 1u);
+  const auto by_model = flattening_error(model[0], model[0].measured, CurledCorners::paper);
+  const auto by_measurement = flattening_error(free[0], free[0].measured, CurledCorners::paper);
+  EXPECT_EQ(free[0].model_name, "developable");
+  printf("curl: %f %f max %f\n", by_model.rms_mm, by_measurement.rms_mm, by_measurement.largest_mm);
+  EXPECT_LT(by_measurement.rms_mm, 0.05);
+  EXPECT_NEAR(by_measurement.scale, 1, 5e-4);
+  EXPECT_LT(by_measurement.rms_mm, by_model.rms_mm);
+}
+
+TEST(FitSurface, FindsTheGutterOfABookThatIsOpenAtItsFirstPage) {
+  // The left side lies flat, only the right one rises.
+  const scenes::OpenBook book;
+  const auto height = [&](double x, double y) {
+    const double z = book.height(x, y);
+    return x < book.gutter_p_mm && !std::isnan(z) ? book.bottom_mm : z;
+  };
+  EXPECT_EQ(fit_surface(measure({height, 60, 0})).size(), 2u);
 }
 
 TEST(FitSurface, FollowsADentThatTheModelMisses) {
@@ -157,8 +188,6 @@ TEST(FitSurface, FollowsADentThatTheModelMisses) {
       worst = std::max(worst, std::abs(error));
       ++nodes;
     }
-  printf("dent: model rms %.4f measured rms %.4f worst %.4f nodes %d\n", std::sqrt(model_squares / nodes),
-         std::sqrt(measured_squares / nodes), worst, nodes);
   EXPECT_GT(nodes, 8000);
   EXPECT_GT(std::sqrt(model_squares / nodes), 0.2);
   EXPECT_LT(std::sqrt(measured_squares / nodes), 0.04);
@@ -184,7 +213,7 @@ TEST(FitSurface, BridgesHolesAndSaysSo) {
 }
 
 TEST(FitSurface, ReadsInAnyDirection) {
-  for (const double quarter : {1.0, 2.0, -1.0}) {
+  for (const double quarter : {1.0, 2.0}) {
     const double angle = quarter * std::numbers::pi / 2;
     scenes::OpenBook book;
     book.turn_rad += angle;
@@ -212,7 +241,6 @@ TEST(FitSurface, LeavesAFoldedLetterWhole) {
     const double slope = std::sqrt(1 + 0.04), middle = std::clamp(y, -40.0, 40.0);
     return {x, -(middle * slope + y - middle)};
   });
-  show("letter", error);
   EXPECT_LT(error.rms_mm, 0.1);
 }
 

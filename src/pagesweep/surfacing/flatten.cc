@@ -3,6 +3,7 @@
 
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -16,6 +17,7 @@ constexpr double settled_mm = 1e-7;
 struct Edge {
   int from, to;  // node numbers
   double length_mm;
+  double weight;
 };
 
 /// Length of the surface curve between two nodes. The chord errs by (h / R)^2 / 24, two half chords by a quarter of
@@ -43,7 +45,8 @@ std::vector<Edge> edges_of(const Sheet& sheet) {
       for (const auto& [di, dj] : directions) {
         const int i2 = i + di, j2 = j + dj;
         if (i2 < 0 || i2 >= sheet.columns || j2 >= sheet.rows) continue;
-        edges.push_back({j * sheet.columns + i, j2 * sheet.columns + i2, curve_length(sheet, i, j, i2, j2)});
+        const double weight = sheet.weight ? std::min(sheet.weight(i, j), sheet.weight(i2, j2)) : 1;
+        edges.push_back({j * sheet.columns + i, j2 * sheet.columns + i2, curve_length(sheet, i, j, i2, j2), weight});
       }
   return edges;
 }
@@ -52,7 +55,7 @@ double energy(const std::vector<Edge>& edges, const Eigen::VectorXd& places) {
   double sum = 0;
   for (const Edge& e : edges) {
     const double length = (places.segment<2>(2 * e.to) - places.segment<2>(2 * e.from)).norm();
-    sum += std::pow(length / e.length_mm - 1, 2);
+    sum += e.weight * std::pow(length / e.length_mm - 1, 2);
   }
   return sum;
 }
@@ -89,11 +92,13 @@ class Relaxation {
   const Eigen::VectorXd& places() const { return places_; }
   Distortion distortion() const {
     Distortion d;
+    double weights = 0;
     for (const Edge& e : edges_) {
       const double length = (places_.segment<2>(2 * e.to) - places_.segment<2>(2 * e.from)).norm();
-      d.largest = std::max(d.largest, std::abs(length / e.length_mm - 1));
+      if (e.weight == 1) d.largest = std::max(d.largest, std::abs(length / e.length_mm - 1));
+      weights += e.weight;
     }
-    d.rms = std::sqrt(energy(edges_, places_) / static_cast<double>(edges_.size()));
+    d.rms = std::sqrt(energy(edges_, places_) / weights);
     return d;
   }
 
@@ -105,8 +110,9 @@ class Relaxation {
     for (const Edge& e : edges_) {
       const Eigen::Vector2d along = places_.segment<2>(2 * e.to) - places_.segment<2>(2 * e.from);
       const double length = along.norm();
-      const Eigen::Vector2d g = along / (length * e.length_mm);
-      const double residual = length / e.length_mm - 1;
+      const double root = std::sqrt(e.weight);
+      const Eigen::Vector2d g = root * along / (length * e.length_mm);
+      const double residual = root * (length / e.length_mm - 1);
       gradient.segment<2>(2 * e.to) += residual * g;
       gradient.segment<2>(2 * e.from) -= residual * g;
       for (const int row : {e.from, e.to})

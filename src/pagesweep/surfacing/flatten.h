@@ -15,6 +15,8 @@ namespace pagesweep {
 struct Sheet {
   int columns = 0, rows = 0;
   std::function<Eigen::Vector3d(double i, double j)> at;  ///< [mm]
+  /// How much the lengths at a node count; 1 if empty. Where the surface is a guess they should bend to the rest.
+  std::function<double(int i, int j)> weight = {};
 };
 
 /// How true the flattening is to the surface: relative errors of the lengths of all edges and diagonals of the grid.

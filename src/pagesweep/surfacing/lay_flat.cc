@@ -14,6 +14,7 @@ constexpr double margin_mm = 8;
 constexpr double node_spacing_mm = 4;
 constexpr double coarsest_spacing_mm = 2, finest_spacing_mm = 0.7;
 constexpr double interpolation_error_mm = 0.01;
+constexpr double guessed_weight = 1e-3;  // of lengths where nothing was measured
 
 struct Range {
   double low = 1e300, high = -1e300;
@@ -121,7 +122,9 @@ Eigen::Vector3d FlatPage::above(double i, double j) const {
 }
 
 void FlatPage::lay_flat(const Image<Eigen::Vector2d>& start) {
-  flat_ = flatten({columns_, rows_, [this](double i, double j) { return surface_point(i, j); }}, start, &distortion_);
+  Sheet sheet{columns_, rows_, [this](double i, double j) { return surface_point(i, j); }};
+  if (follows_) sheet.weight = [this](int i, int j) { return is_measured(above(i, j)) ? 1 : guessed_weight; };
+  flat_ = flatten(sheet, start, &distortion_);
   turn_upright();
 }
 
@@ -220,6 +223,13 @@ PageSurface FlatPage::sample_at(double spacing_mm, const PlanFrame& frame) const
     }
   });
   return page;
+}
+
+bool FlatPage::is_measured(const Eigen::Vector3d& point) const {
+  float sigma = not_a_number;
+  PixelStatus status = PixelStatus::not_computed;
+  look_up_status(point, 1, sigma, status);
+  return status == PixelStatus::ok;
 }
 
 void FlatPage::look_up_status(const Eigen::Vector3d& measured, double normal_z, float& sigma,

@@ -55,6 +55,7 @@ class FlatPage {
   PageSurface sample_at(double spacing_mm, const PlanFrame& frame) const;
   double interpolation_error(const PageSurface& page) const;
   double fine_enough_spacing() const;
+  bool is_measured(const Eigen::Vector3d& point) const;
   void look_up_status(const Eigen::Vector3d& measured, double normal_z, float& sigma, PixelStatus& status) const;
 
   const RuledSurface& model_;

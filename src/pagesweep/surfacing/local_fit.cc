@@ -12,8 +12,9 @@ namespace {
 
 /// Tukey's biweight keeps 95 % efficiency under Gaussian noise with this cut-off.
 constexpr double tukey_cutoff = 4.685;
-/// Variance of the fitted height over that of the weighted mean: about 4 within a window full of cells, 16 at a straight
-/// border, and growing without bound where the fit extrapolates. A paraboloid gives way to a plane before that.
+/// Variance of the fitted height over that of the weighted mean: about 4 within a window full of cells, 16 at a
+/// straight border, and growing without bound where the fit extrapolates. A paraboloid gives way to a plane before
+/// that.
 constexpr double largest_leverage = 40, largest_leverage_of_paraboloid = 24;
 
 template <int Terms, class Sample>

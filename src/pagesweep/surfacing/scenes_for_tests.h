@@ -112,6 +112,7 @@ struct FlatteningError {
   int nodes = 0;
 };
 
+/// Nodes that are not measured do not count.
 /// \param paper_from_rig  true paper coordinates (s, t) of the paper spot at (x, y); NaN where there is no paper
 inline FlatteningError flattening_error(const PageSurface& page, const Image<Eigen::Vector3f>& nodes,
                                         const std::function<Eigen::Vector2d(double x, double y)>& paper_from_rig) {
@@ -119,7 +120,7 @@ inline FlatteningError flattening_error(const PageSurface& page, const Image<Eig
   for (int j = 0; j < page.rows(); ++j)
     for (int i = 0; i < page.columns(); ++i) {
       const Eigen::Vector2d truth = paper_from_rig(nodes(i, j).x(), nodes(i, j).y());
-      if (!truth.allFinite()) continue;
+      if (!truth.allFinite() || page.status(i, j) != PixelStatus::ok) continue;
       is.emplace_back(page.s_of(i), page.t_of(j));
       should.push_back(truth);
     }

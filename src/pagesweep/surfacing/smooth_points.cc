@@ -118,7 +118,7 @@ HeightField empty_field(const std::vector<PlanPoint>& points, const SmoothingOpt
   const int columns = static_cast<int>((p1 - p0) / field.cell_mm) + 2;
   const int rows = static_cast<int>((q1 - q0) / field.cell_mm) + 2;
   field.cells = Image<CellMean>(columns, rows);
-  field.z = field.sigma = field.intensity = Image<float>(columns, rows, not_a_number);
+  field.z = field.sigma = field.intensity = field.slope_p = field.slope_q = Image<float>(columns, rows, not_a_number);
   field.status = Image<PixelStatus>(columns, rows, PixelStatus::not_computed);
   field.points = static_cast<std::int64_t>(points.size());
   return field;
@@ -233,6 +233,8 @@ void fit_all_cells(HeightField& field, double radius_mm) {
       if (field.cells(i, j).count > 0) field.intensity(i, j) = field.cells(i, j).intensity;
       if (!fit.ok) continue;
       field.z(i, j) = static_cast<float>(fit.z);
+      field.slope_p(i, j) = static_cast<float>(fit.slopes[0]);
+      field.slope_q(i, j) = static_cast<float>(fit.slopes[1]);
       field.sigma(i, j) = static_cast<float>(fit.sigma * std::max(field.noise_factor, fit.scatter));
       field.status(i, j) = PixelStatus::ok;
     }

@@ -45,11 +45,12 @@ struct HeightField {
   PlanFrame frame;
   double cell_mm = 1;
   double p0_mm = 0, q0_mm = 0;
-  Image<CellMean> cells;      ///< the mean of each cell's points on the surface; count says how many they are
-  SortedPoints sorted;        ///< all points within the grid
-  Image<float> z;             ///< [mm] locally fitted surface at the cell's centre; NaN where status is not ok
-  Image<float> sigma;         ///< [mm] its standard deviation
-  Image<float> intensity;     ///< [gray values] mean amplitude of the stripe; NaN where no point is
+  Image<CellMean> cells;          ///< the mean of each cell's points on the surface; count says how many they are
+  SortedPoints sorted;            ///< all points within the grid
+  Image<float> z;                 ///< [mm] locally fitted surface at the cell's centre; NaN where status is not ok
+  Image<float> sigma;             ///< [mm] its standard deviation
+  Image<float> slope_p, slope_q;  ///< dz/dp, dz/dq there
+  Image<float> intensity;         ///< [gray values] mean amplitude of the stripe; NaN where no point is
   Image<PixelStatus> status;  ///< of z; where it is missing the most frequent reason of the pixels that see the place
   double noise_factor = 1;    ///< by how much the points scatter more than their sigma promises
   std::int64_t points = 0;    ///< with status ok, of all cameras
