@@ -161,6 +161,10 @@ TEST(ComparePoints, LocalFitsAverageTheNoiseAway) {
   // standard deviation sigma / sqrt(n).
   EXPECT_GT(errors.fitted.count, 500u);
   EXPECT_NEAR(errors.fitted.rms, 0.1 / std::sqrt(90.0), 0.003);
+  // A quadric's height in the middle of a disk of n points has twice that: its second-order terms must be told apart
+  // from it (variance 4 / n for evenly spread points).
+  const PointComparisonOptions curved{.neighbourhood_mm = 30, .local_fit = LocalFit::quadric};
+  EXPECT_NEAR(compare_points(scene.views(), curved).all.fitted.rms, 2 * 0.1 / std::sqrt(90.0), 0.005);
 }
 
 TEST(ComparePoints, NothingMeasuredIsCountedNotAnError) {

@@ -19,12 +19,13 @@ struct Sample {
   double weight;  ///< 1 / sigma^2, up to a factor
 };
 
-using Terms = Eigen::Matrix<double, 6, 1>;
-
-Terms terms_at(const Sample& sample) {
-  Terms terms;
-  terms << 1, sample.a, sample.b, sample.a * sample.a, sample.a * sample.b, sample.b * sample.b;
-  return terms;
+/// The polynomial's terms: N = 3 for a plane, 6 for a quadric.
+template <int N>
+Eigen::Matrix<double, N, 1> terms_at(const Sample& s) {
+  if constexpr (N == 3)
+    return {1, s.a, s.b};
+  else
+    return Eigen::Matrix<double, N, 1>{1, s.a, s.b, s.a * s.a, s.a * s.b, s.b * s.b};
 }
 
 std::vector<Sample> gather(const PointMap& points, int x, int y, const Eigen::Vector3d& center, double radius_mm) {
@@ -71,30 +72,27 @@ bool surround_the_centre(const std::vector<Sample>& samples) {
   return std::hypot(a, b) < most * static_cast<double>(samples.size());
 }
 
-}  // namespace
-
-std::optional<Eigen::Vector3d> fit_locally(const PointMap& points, int x, int y, const Eigen::Vector3d& camera_center,
-                                           double diameter_mm, LocalFit model) {
-  std::vector<Sample> samples = gather(points, x, y, camera_center, diameter_mm / 2);
-  const Eigen::Index unknowns = model == LocalFit::plane ? 3 : 6;
-  if (samples.size() < 2 * static_cast<std::size_t>(unknowns) || !surround_the_centre(samples)) return std::nullopt;
+/// Height of the fitted polynomial at the centre; nothing if the samples do not determine it.
+template <int N>
+std::optional<double> fit_height(const std::vector<Sample>& samples) {
+  if (samples.size() < 2 * N) return std::nullopt;
   std::vector<double> robust(samples.size(), 1), sizes(samples.size());
   double height = 0;
   for (int round = 0; round < 4; ++round) {
-    Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-    Terms right = Terms::Zero();
+    Eigen::Matrix<double, N, N> normal = Eigen::Matrix<double, N, N>::Zero();
+    Eigen::Matrix<double, N, 1> right = Eigen::Matrix<double, N, 1>::Zero();
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      const Terms terms = terms_at(samples[i]);
+      const auto terms = terms_at<N>(samples[i]);
       const double weight = robust[i] * samples[i].weight;
       normal += weight * terms * terms.transpose();
       right += weight * samples[i].height * terms;
     }
-    const Eigen::LDLT<Eigen::MatrixXd> factors(normal.topLeftCorner(unknowns, unknowns));
+    const Eigen::LDLT<Eigen::Matrix<double, N, N>> factors(normal);
     if (factors.info() != Eigen::Success || !(factors.rcond() > 1e-9)) return std::nullopt;
-    const Eigen::VectorXd solution = factors.solve(right.head(unknowns));
+    const Eigen::Matrix<double, N, 1> solution = factors.solve(right);
     height = solution[0];
     for (std::size_t i = 0; i < samples.size(); ++i)
-      sizes[i] = std::abs(samples[i].height - terms_at(samples[i]).head(unknowns).dot(solution));
+      sizes[i] = std::abs(samples[i].height - terms_at<N>(samples[i]).dot(solution));
     const double limit = 4.685 * 1.4826 * median_of(sizes);  // Tukey's 95 % efficiency at a Gaussian
     if (!(limit > 0)) break;
     for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -102,8 +100,19 @@ std::optional<Eigen::Vector3d> fit_locally(const PointMap& points, int x, int y,
       robust[i] = r < 1 ? (1 - r * r) * (1 - r * r) : 0;
     }
   }
+  return height;
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> fit_locally(const PointMap& points, int x, int y, const Eigen::Vector3d& camera_center,
+                                           double diameter_mm, LocalFit model) {
+  const std::vector<Sample> samples = gather(points, x, y, camera_center, diameter_mm / 2);
+  if (!surround_the_centre(samples)) return std::nullopt;
+  const auto height = model == LocalFit::plane ? fit_height<3>(samples) : fit_height<6>(samples);
+  if (!height) return std::nullopt;
   const Eigen::Vector3d own(points.x(x, y), points.y(x, y), points.z(x, y));
-  return own + height * (camera_center - own).normalized();
+  return own + *height * (camera_center - own).normalized();
 }
 
 }  // namespace pagesweep

@@ -137,8 +137,8 @@ std::string format_pages(const ReportInputs& inputs, const PictureEncoder& encod
     PictureFigure figure = photo_figure(page.picture, page_px, encoder);
     figure.title = fmt::format("Page {}, flat.", page.index);
     figure.caption =
-        fmt::format("True to scale; turned by {:.2f}° to stand upright. {:.1f} % of it rest on measured points.",
-                    page.deskew_rad * 180 / M_PI, 100 * page.measured_share);
+        fmt::format("True to scale; turned by {}° to stand upright. {:.1f} % of it rest on measured points.",
+                    format_number(page.deskew_rad * 180 / M_PI), 100 * page.measured_share);
     after += format_figure(figure);
   }
   // A spread on one row and its pages on the next are to the same scale; a single page stands beside its scan.
@@ -164,7 +164,7 @@ std::string format_relief(const ReportInputs& inputs, const PictureEncoder& enco
   std::string differences;
   for (const PageSurface& surface : inputs.surfaces) {
     const Image<float> difference = difference_of(surface);
-    PictureFigure figure = map_figure(difference, Ramp::diverging, symmetric_range_of(difference), "mm", encoder);
+    PictureFigure figure = map_figure(difference, Ramp::diverging, symmetric_range_of(difference, 0.03), "mm", encoder);
     figure.title = fmt::format("Page {}: what the {} model misses.", surface.index, surface.model_name);
     figure.caption =
         "Measured surface above (red) or below (blue) the model. The difference vector carries it into the page.";
@@ -209,7 +209,9 @@ std::string format_times(const CameraReport& camera, const PictureEncoder& encod
 std::string format_points(const CameraReport& camera, const PictureEncoder& encoder) {
   if (!camera.points) return "";
   const Image<float> sigma = shrink(camera.points->sigma, map_px);
-  PictureFigure certainty = map_figure(sigma, Ramp::sequential, {0, range_of(sigma, 0.02).high}, "mm", encoder);
+  // The table beside the page may be ten times as uncertain: it must not take all the colours.
+  const double highest = std::min(range_of(sigma, 0.02).high, 4 * range_of(sigma, 0.5).high);
+  PictureFigure certainty = map_figure(sigma, Ramp::sequential, {0, highest}, "mm", encoder);
   certainty.title = camera.name + ": depth error.";
   certainty.caption =
       "One standard deviation along the viewing ray, as the two time values predict it. Print is darker, "

@@ -236,7 +236,9 @@ TEST(Judge, NamesWhatIsWrongAndWhatToDo) {
   EXPECT_THAT(judge(book.inputs).remarks.at(0), HasSubstr("lost 20 of 200 frames"));
   book.inputs.cameras[1].dropped = 0;
   for (int i = 0; i < 64 * 20; ++i) book.points[0].status.data()[i + 64 * 20] = PixelStatus::saturated;
-  EXPECT_THAT(judge(book.inputs).remarks.at(0), HasSubstr("expose shorter"));
+  EXPECT_EQ(judge(book.inputs).level, VerdictLevel::good) << "the pages are complete: it is lost beside them";
+  book.pages[1].measured_share = 0.9;
+  EXPECT_THAT(judge(book.inputs).remarks.at(1), HasSubstr("expose shorter"));
 }
 
 TEST(EscapeHtml, LetsNoMarkupThrough) {

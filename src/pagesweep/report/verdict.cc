@@ -76,11 +76,19 @@ constexpr Remedy remedies[] = {
     {PixelStatus::bad_fit, "of what {} sees does not follow the stripe: gloss, or something moved during the sweep"},
 };
 
-void judge_camera(const CameraReport& camera, const VerdictOptions& limits, Verdict& verdict) {
+/// Whether every page has what it needs. What is lost beside the pages then harms nobody.
+bool pages_are_complete(const ReportInputs& inputs) {
+  return !inputs.pages.empty() && std::all_of(inputs.pages.begin(), inputs.pages.end(), [&](const Page& page) {
+    return page.measured_share >= inputs.verdict.good_share;
+  });
+}
+
+void judge_camera(const CameraReport& camera, const ReportInputs& inputs, Verdict& verdict) {
+  const VerdictOptions& limits = inputs.verdict;
   if (camera.frames > 0 && camera.dropped > limits.most_dropped * camera.frames)
     worsen(verdict, VerdictLevel::look,
            fmt::format("{} lost {} of {} frames: check its connection.", camera.name, camera.dropped, camera.frames));
-  if (!camera.points) return;
+  if (!camera.points || pages_are_complete(inputs)) return;
   const StatusCounts counts = count_status(camera.points->status);
   const auto ok = static_cast<double>(counts[static_cast<std::size_t>(PixelStatus::ok)]);
   for (const Remedy& remedy : remedies) {
@@ -110,7 +118,7 @@ Verdict judge(const ReportInputs& inputs) {
   Verdict verdict;
   judge_points(inputs, verdict);
   judge_pages(inputs, verdict);
-  for (const CameraReport& camera : inputs.cameras) judge_camera(camera, inputs.verdict, verdict);
+  for (const CameraReport& camera : inputs.cameras) judge_camera(camera, inputs, verdict);
   verdict.headline = headline_of(inputs);
   verdict.advice = verdict.level == VerdictLevel::good ? "No need to scan again."
                    : verdict.level == VerdictLevel::look
