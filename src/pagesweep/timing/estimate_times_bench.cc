@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
 
+#include <array>
+#include <numeric>
+
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/timing/estimate_times.h"
 #include "pagesweep/timing/learn_profile.h"
@@ -47,7 +50,8 @@ void estimate_times_of_a_camera(benchmark::State& state) {
       bias[phase] += error, hits[phase] += 1;
     }
   double bias_squares = 0;
-  for (std::size_t i = 0; i < phases; ++i) bias_squares += std::pow(bias[i] / hits[i], 2) / phases;
+  const double mean = std::accumulate(bias.begin(), bias.end(), 0.0) / count;  // of no consequence: cameras share it
+  for (std::size_t i = 0; i < phases; ++i) bias_squares += std::pow(bias[i] / hits[i] - mean, 2) / phases;
   bias_squares = std::max(0.0, bias_squares - squares / count / (count / phases));  // without its own noise
   state.counters["error_vs_bound"] = std::sqrt(squares / bounds);
   state.counters["bias_vs_bound"] = std::sqrt(bias_squares / (bounds / count));

@@ -18,7 +18,7 @@ struct Pupil {
   std::size_t camera = 0;
   std::vector<float> gray;
   int first_frame = 0;   ///< of gray, after it was cut to the stripe's surroundings
-  bool clipped = false;  ///< or so near to it that only its noise decided
+  bool clipped = false;  ///< at least one sample is
   double middle = 0;     ///< [frames] between the crossings of half height
   double fwhm = 0;       ///< [frames]
   Bell bell;
@@ -79,7 +79,7 @@ bool examine(Pupil& pupil, double ceiling) {
   pupil.bell.background = *quarter;
   pupil.bell.amplitude = high - pupil.bell.background;
   const double noise = std::max(median(changes), 0.5);
-  pupil.clipped = high > 0.97 * ceiling;
+  pupil.clipped = std::isinf(pupil.gray[static_cast<std::size_t>(peak)]);
   if (pupil.bell.amplitude < 10 * noise) return false;
   const auto half = static_cast<float>(pupil.bell.background + 0.5 * pupil.bell.amplitude);
   const double rise = crossing(pupil.gray, peak, -1, half), fall = crossing(pupil.gray, peak, 1, half);
@@ -255,13 +255,15 @@ class Teacher {
                std::vector<std::vector<StripeProfile::Point>>& bins) const {
     const SensorNoise& noise = learned_.noise[pupil.camera];
     for (std::size_t k = 0; k < pupil.gray.size(); ++k) {
-      const double gray = pupil.gray[k];
-      // Close below the ceiling only those samples are unclipped whose noise is negative.
-      if (!std::isfinite(gray) || gray > noise.ceiling - 3 * std::sqrt(noise.variance(gray))) continue;
-      const double time = (pupil.first_frame + static_cast<double>(k) - bell.time) / bell.width;
+      const double gray = pupil.gray[k], frame = pupil.first_frame + static_cast<double>(k);
+      const double model = bell.gray_at(frame, learned_.profile);
+      // Close below the ceiling those samples are clipped whose noise is positive. To leave out whole moments, as the
+      // model has them, and not single samples, as they came out, keeps the profile's tip from a bias.
+      if (!std::isfinite(gray) || model > noise.ceiling - 3 * std::sqrt(noise.variance(model))) continue;
+      const double time = (frame - bell.time) / bell.width;
       const double bin = (time - begin) / bin_length;
       if (bin < 0 || bin >= static_cast<double>(bins.size())) continue;
-      const double weight = bell.amplitude * bell.amplitude / noise.variance(gray);
+      const double weight = bell.amplitude * bell.amplitude / noise.variance(model);
       bins[static_cast<std::size_t>(bin)].push_back({time, (gray - bell.background) / bell.amplitude, weight});
     }
   }
