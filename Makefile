@@ -66,7 +66,7 @@ bench: setup  ## build and run the benchmarks of every directory
 
 .PHONY: docs
 docs: build  ## write docs/options.md anew from the program's own help
-	build/release/pagesweep help-all --markdown > build/release/options.md && cp build/release/options.md docs/options.md
+	scripts/document-options build/release/pagesweep
 
 .PHONY: install
 install: build  ## install program, library and headers below prefix=/usr/local

@@ -17,7 +17,8 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
       ->group(group)
       ->option_text("<number>")
       ->check(CLI::NonNegativeNumber);
-  command.get_help_ptr()->group(group)->description("print this help");
+  command.set_help_flag("");  // made anew, so that it stands with these
+  command.set_help_flag("-h,--help", "print this help")->group(group);
 }
 
 void add_input(CLI::App& command, const std::string& name, std::filesystem::path& field, const std::string& help) {

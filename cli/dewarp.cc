@@ -51,8 +51,9 @@ void run(const Arguments& arguments) {
 void add_dewarp_command(CLI::App& app) {
   auto* command = app.add_subcommand("dewarp", R"(Make the pages anew from points that are measured already.
 
-Takes the points from the result of an earlier scan or reconstruct, the rig and the scan from the capture that they were
-measured in, and writes the pages as scan does. The frames are not needed.
+Takes the points from the result of an earlier scan or reconstruct, the rig and the scan from
+the capture that they were measured in, and writes the pages as scan does. The frames are not
+needed.
 )");
   const auto arguments = std::make_shared<Arguments>();
   add_input(*command, "RESULT", arguments->result, "folder that scan or reconstruct wrote");

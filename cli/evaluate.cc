@@ -38,9 +38,10 @@ void run(const Arguments& arguments) {
 void add_evaluate_command(CLI::App& app) {
   auto* command = app.add_subcommand("evaluate", R"(Compare a result with the truth of a simulated capture.
 
-Prints the distances of the points to the true surface, the errors of the time values, and by how many millimetres the
-print of each flat page is out of place. A figure that cannot be found says why. The result's report.html gets a section
-with the same figures and with maps of the errors.
+Prints the distances of the points to the true surface, the errors of the time values, and by
+how many millimetres the print of each flat page is out of place. A figure that cannot be found
+says why. The result's report.html gets a section with the same figures and with maps of the
+errors.
 )");
   const auto arguments = std::make_shared<Arguments>();
   add_input(*command, "RESULT", arguments->result, "folder that scan or reconstruct wrote");

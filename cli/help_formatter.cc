@@ -42,6 +42,25 @@ std::string names_of_option(const CLI::Option& option) {
 
 }  // namespace
 
+std::string HelpFormatter::make_help(const CLI::App* app, std::string name, CLI::AppFormatMode) const {
+  std::string text = app->get_description() + "\n" + make_usage(app, std::move(name));
+  const auto add_group = [&](const std::string& heading, const std::string& entries) {
+    if (!entries.empty()) text += "\n" + heading + ":\n" + entries;
+  };
+  for (const std::string& group : app->get_groups()) {
+    std::string entries;
+    for (const bool positional : {true, false})
+      for (const CLI::Option* option : app->get_options())
+        if (option->get_group() == group && option->get_positional() == positional)
+          entries += make_option(option, positional);
+    add_group(group, entries);
+  }
+  std::string commands;
+  for (const CLI::App* command : app->get_subcommands({})) commands += make_subcommand(command);
+  add_group("Commands", commands);
+  return text + "\n" + app->get_footer();
+}
+
 std::string HelpFormatter::make_option(const CLI::Option* option, bool is_positional) const {
   std::string name = is_positional ? option->get_name(true, false) : names_of_option(*option);
   if (!is_positional && !option->get_option_text().empty()) name += " " + option->get_option_text();

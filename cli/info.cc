@@ -77,8 +77,8 @@ void run(const Arguments& arguments) {
 void add_info_command(CLI::App& app) {
   auto* command = app.add_subcommand("info", R"(Say what a file or folder is, and whether it is sound.
 
-Knows captures, rigs, results, reference data, point clouds (PLY) and pictures. A capture is read to its last frame:
-what is broken in it is found here, before a measurement.
+Knows captures, rigs, results, reference data, point clouds (PLY) and pictures. A capture is
+read to its last frame: what is broken in it is found here, before a measurement.
 )");
   const auto arguments = std::make_shared<Arguments>();
   add_input(*command, "PATH", arguments->input, "a file or a folder");

@@ -23,12 +23,15 @@ constexpr const char* footer = R"(Try it without a scanner:
   pagesweep scan capture -o result
   pagesweep evaluate result --truth capture/truth
 
-Exit status: 0 done; 1 a defect of this program; 2 wrong usage; 3 an input that cannot be used; 4 an input that cannot be
-read; 5 an output that cannot be written; 6 nothing could be measured; 128 + n ended by signal n.
+Exit status: 0 done; 1 a defect of this program; 2 wrong usage; 3 an input that cannot be used;
+4 an input that cannot be read; 5 an output that cannot be written; 6 nothing could be measured;
+128 + n ended by signal n.
 )";
 
 void add_commands(CLI::App& app) {
-  app.formatter(std::make_shared<HelpFormatter>());
+  const auto formatter = std::make_shared<HelpFormatter>();
+  formatter->label("SUBCOMMAND", "COMMAND");
+  app.formatter(formatter);
   app.footer(footer);
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("pagesweep " PAGESWEEP_VERSION), "print the version");
@@ -58,7 +61,7 @@ int run(CLI::App& app, int argc, char** argv) {
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return complain(usage_error, fmt::format("{}\nType `{} --help` for help.", error.what(), name_of_command(app)));
+    return complain(usage_error, fmt::format("{} (see {} --help)", error.what(), name_of_command(app)));
   } catch (const Error& error) {
     return complain(exit_code_of(error.kind()), error.what());
   } catch (const std::invalid_argument& error) {  // an option's value that a station refuses

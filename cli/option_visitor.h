@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -22,7 +23,7 @@ class OptionVisitor {
   OptionVisitor(CLI::App& command, std::string group) : command_(command), group_(std::move(group)) {}
 
   void operator()(std::string_view name, bool& field, std::string_view, std::string_view help) {
-    command_.add_flag(fmt::format("--{0},!--no-{0}", name), field)
+    command_.add_flag(field ? fmt::format("--{0},!--no-{0}", name) : fmt::format("--{}", name), field)
         ->group(group_)
         ->description(fmt::format("{} [{}]", help, field ? "on" : "off"));
   }
@@ -35,8 +36,11 @@ class OptionVisitor {
     requires std::is_arithmetic_v<Number>
   void operator()(std::string_view name, Number& field, std::string_view unit, std::string_view help) {
     add(name, field, unit.empty() ? "<number>" : fmt::format("<{}>", unit), help, fmt::format("{}", field))
-        ->check([](const std::string& text) { return std::isfinite(std::stod(text)) ? "" : "is no finite number"; },
-                "");
+        ->check(
+            [](const std::string& text) {
+              return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : "must be finite";
+            },
+            "");
   }
 
   template <class Enum>
@@ -55,8 +59,8 @@ class OptionVisitor {
                                                                           fmt::join(names_of(Enum{}), ", ")));
                     })
         ->group(group_)
-        ->option_text("<name>")
-        ->description(fmt::format("{}: {} [{}]", help, fmt::join(names_of(Enum{}), ", "), name_of(field)));
+        ->option_text(fmt::format("{}", fmt::join(names_of(Enum{}), "|")))
+        ->description(fmt::format("{} [{}]", help, name_of(field)));
   }
 
  private:

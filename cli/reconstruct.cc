@@ -40,9 +40,10 @@ void run(const Arguments& arguments) {
 void add_reconstruct_command(CLI::App& app) {
   auto* command = app.add_subcommand("reconstruct", R"(Measure the surface that two cameras see: frames to points.
 
-Works on a moving stripe (--matcher time), on any sequence of projected patterns (--matcher sequence), and with a single
-camera whose rig knows the sheet of light (--matcher light-section). Writes points.ply, and for each camera maps of points,
-standard deviations, times and of the reason why a pixel has no point.
+Works on a moving stripe (--matcher time), on any sequence of projected patterns (--matcher
+sequence), and with a single camera whose rig knows the sheet of light (--matcher light-
+section). Writes points.ply, and for each camera maps of points, standard deviations, times and
+of the reason why a pixel has no point.
 )");
   const auto arguments = std::make_shared<Arguments>();
   arguments->input.add_to(*command);

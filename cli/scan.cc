@@ -53,7 +53,8 @@ Reads a capture (the frames of both cameras, the scanner's picture and the rig) 
 
   page_1.png, page_2.png   the flat pages from left to right, true to scale
   points.ply               the measured surface, for CloudCompare or MeshLab
-  report.html              how well it was measured, and why anything is missing; report.json for programs
+  report.html              how well it was measured, and why anything is missing
+  report.json              the same for programs
   page_N_scanmap.tiff      where in the scan each pixel of page N was taken from
   page_N_surface.tiff      the page's shape
   CAMERA_*.tiff            per camera pixel: point, standard deviation, time, reason why it has none
@@ -69,7 +70,7 @@ Reads a capture (the frames of both cameras, the scanner's picture and the rig) 
   command->footer(R"(Examples:
   pagesweep scan capture -o result
   pagesweep scan capture -o result --dpi 400 --format tiff
-  pagesweep scan capture -o plain --no-difference-vector      # the surface model alone, to see what dents do
+  pagesweep scan capture -o plain --no-difference-vector   # the surface model alone: see what dents do
 )");
   command->callback([arguments] { run(*arguments); });
 }

@@ -55,8 +55,9 @@ void run(const Arguments& arguments) {
 void add_simulate_command(CLI::App& app) {
   auto* command = app.add_subcommand("simulate", R"(Render a capture of a scene, with the truth of everything.
 
-Reads a scene (a JSON file; see scenes/) and writes a capture folder as a scanner would, and in its folder truth/ what the
-measurement should find: the true points, the flat pages as printed, and where in the scan each spot of them is.
+Reads a scene (a JSON file; see scenes/) and writes a capture folder as a scanner would, and in
+its folder truth/ what the measurement should find: the true points, the flat pages as printed,
+and where in the scan each spot of them is.
 )");
   const auto arguments = std::make_shared<Arguments>();
   add_input(*command, "SCENE", arguments->scene, "scene file");
