@@ -128,6 +128,12 @@ void FlatPage::lay_flat(const Image<Eigen::Vector2d>& start) {
   turn_upright();
 }
 
+/// Paper coordinates of the model's spot at a place (p, q).
+Eigen::Vector2d FlatPage::paper_at(const Eigen::Vector2d& plan) const {
+  const Eigen::Vector2d ruling = model_.frame.ruling_from_plan(plan);
+  return interpolate_nodes(flat_, (cut_.length_at(ruling.x()) - length0_) / length_step_, (ruling.y() - b0_) / b_step_);
+}
+
 /// Turns the paper so that the gutter runs along t; a single page so that it lies as it is seen from above. Then shifts
 /// (0, 0) to the upper left corner of what is measured.
 void FlatPage::turn_upright() {
@@ -142,18 +148,15 @@ void FlatPage::turn_upright() {
     for (int j = 0; j < rows_; ++j) mean += flat_(column, j) / rows_;
     for (int j = 0; j < rows_; ++j) add(flat_(column, j) - mean, {0, 0.5 * (rows_ - 1) - j});
   } else {
+    // The measured places alone: the margin may be bent to any side.
+    std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> pairs;
     Eigen::Vector2d mean_flat = Eigen::Vector2d::Zero(), mean_plan = mean_flat;
-    const auto plan = [&](int i, int j) {
-      const Eigen::Vector3d point = model_point(i, j);
-      return Eigen::Vector2d(point.x(), -point.y());
-    };
-    for (int j = 0; j < rows_; ++j)
-      for (int i = 0; i < columns_; ++i) {
-        mean_flat += flat_(i, j) / static_cast<double>(flat_.size());
-        mean_plan += plan(i, j) / static_cast<double>(flat_.size());
-      }
-    for (int j = 0; j < rows_; ++j)
-      for (int i = 0; i < columns_; ++i) add(flat_(i, j) - mean_flat, plan(i, j) - mean_plan);
+    for (const Eigen::Vector2d& plan : places_) {
+      pairs.emplace_back(paper_at(plan), Eigen::Vector2d(plan.x(), -plan.y()));
+      mean_flat += pairs.back().first / static_cast<double>(places_.size());
+      mean_plan += pairs.back().second / static_cast<double>(places_.size());
+    }
+    for (const auto& [flat, plan] : pairs) add(flat - mean_flat, plan - mean_plan);
   }
   const Eigen::Rotation2Dd turn(std::atan2(sine, cosine));
   for (Eigen::Vector2d& place : flat_.pixels()) place = turn * place;

@@ -49,6 +49,7 @@ class FlatPage {
   Eigen::Vector3d above(double i, double j) const;
   Eigen::Vector3d surface_point(double i, double j) const { return follows_ ? above(i, j) : model_point(i, j); }
   void lay_flat(const Image<Eigen::Vector2d>& start);
+  Eigen::Vector2d paper_at(const Eigen::Vector2d& plan) const;
   void turn_upright();
   void find_outline();
   Eigen::Vector2d node_at(const Eigen::Vector2d& paper, Eigen::Vector2d guess) const;
