@@ -36,11 +36,7 @@ class OptionVisitor {
     requires std::is_arithmetic_v<Number>
   void operator()(std::string_view name, Number& field, std::string_view unit, std::string_view help) {
     add(name, field, unit.empty() ? "<number>" : fmt::format("<{}>", unit), help, fmt::format("{}", field))
-        ->check(
-            [](const std::string& text) {
-              return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : "must be finite";
-            },
-            "");
+        ->check(problem_of_number, "");
   }
 
   template <class Enum>
@@ -64,6 +60,13 @@ class OptionVisitor {
   }
 
  private:
+  /// "" if it is a finite number, else what is wrong.
+  static std::string problem_of_number(const std::string& text) {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    return !text.empty() && *end == 0 && std::isfinite(value) ? "" : fmt::format("'{}' is no number", text);
+  }
+
   template <class Field>
   CLI::Option* add(std::string_view name, Field& field, const std::string& placeholder, std::string_view help,
                    const std::string& preset) {

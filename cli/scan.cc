@@ -70,7 +70,7 @@ Reads a capture (the frames of both cameras, the scanner's picture and the rig) 
   command->footer(R"(Examples:
   pagesweep scan capture -o result
   pagesweep scan capture -o result --dpi 400 --format tiff
-  pagesweep scan capture -o plain --no-difference-vector   # the surface model alone: see what dents do
+  pagesweep scan capture -o plain --no-difference-vector   # the model alone: see what dents do
 )");
   command->callback([arguments] { run(*arguments); });
 }
