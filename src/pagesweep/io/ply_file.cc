@@ -46,11 +46,6 @@ std::optional<PlyType> type_named(std::string_view name) {
   return std::nullopt;
 }
 
-constexpr std::size_t size_of(PlyType type) {
-  constexpr std::array<std::size_t, 8> sizes = {1, 1, 2, 2, 4, 4, 4, 8};
-  return sizes[static_cast<std::size_t>(type)];
-}
-
 struct Property {
   PlyType type = PlyType::float32;
   std::optional<PlyType> list_count;  ///< a list: its length, then so many values

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// One fuzzer a format: whatever the bytes are, a reader returns or throws pagesweep::Error. Anything else ends the
+// process, which is what libFuzzer looks for.
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "pagesweep/base/error.h"
+#include "pagesweep/io/capture_file.h"
+#include "pagesweep/io/float_tiff.h"
+#include "pagesweep/io/image_file.h"
+#include "pagesweep/io/ply_file.h"
+#include "pagesweep/io/rig_file.h"
+#include "pagesweep/io/truth_file.h"
+
+namespace {
+
+void read(const std::filesystem::path& file) {
+#if defined(PAGESWEEP_FUZZ_rig)
+  pagesweep::read_rig(file);
+#elif defined(PAGESWEEP_FUZZ_capture)
+  pagesweep::read_capture(file);
+#elif defined(PAGESWEEP_FUZZ_truth)
+  pagesweep::read_truth(file);
+#elif defined(PAGESWEEP_FUZZ_ply)
+  pagesweep::read_ply(file);
+#elif defined(PAGESWEEP_FUZZ_float_tiff)
+  pagesweep::read_float_tiff(file);
+#else  // png, tiff: told apart by their first bytes
+  pagesweep::read_gray(file);
+#endif
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  // A file in memory: the readers take paths.
+  const int descriptor = ::memfd_create("input", MFD_CLOEXEC);
+  if (descriptor < 0 || ::write(descriptor, data, size) != static_cast<ssize_t>(size)) return -1;
+  try {
+    read("/proc/self/fd/" + std::to_string(descriptor));
+  } catch (const pagesweep::Error&) {
+  }
+  ::close(descriptor);
+  return 0;
+}
