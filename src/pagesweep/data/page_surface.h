@@ -19,7 +19,7 @@ namespace pagesweep {
 ///
 /// `model` is the smooth surface model of paper section IV step 1, `measured` the measurement that lies
 /// orthogonally above each model point (step 2; eq. 12 is the difference of their pictures in the scan).
-/// Where nothing was measured, `measured` equals `model` and `status` says why.
+/// Where nothing was measured, `measured` eases from the nearest measurements to `model` and `status` says why.
 struct PageSurface {
   int index = 1;           ///< page number from left to right, 1 first
   std::string model_name;  ///< "cylinder", "developable", ...
