@@ -56,13 +56,13 @@ double quantile(std::vector<float> values, double share) {
 }
 
 /// Blank paper: nearly the brightest of what was measured (of all, if nothing was).
-double paper_brightness(const FlatPreview& preview, const Image<float>& closed) {
+double paper_brightness(const FlatPreview& preview, const Image<float>& levels) {
   std::vector<float> measured, all;
   for (int y = 0; y < preview.height(); ++y)
     for (int x = 0; x < preview.width(); ++x) {
       if (std::isnan(preview.brightness(x, y))) continue;
-      all.push_back(closed(x, y));
-      if (preview.measured(x, y)) measured.push_back(closed(x, y));
+      all.push_back(levels(x, y));
+      if (preview.measured(x, y)) measured.push_back(levels(x, y));
     }
   if (all.empty()) throw no_result("the scan shows no part of the page: does the rig's scanner belong to this scan?");
   return quantile(measured.empty() ? all : measured, 0.85);
@@ -70,7 +70,7 @@ double paper_brightness(const FlatPreview& preview, const Image<float>& closed) 
 
 /// The table at one side: the typical brightness of the outermost 2 mm that the scan shows, as far as that is darker
 /// than paper; nothing if paper, or nothing at all, is seen there.
-std::optional<double> table_brightness(const SideOfPreview& side, const Image<float>& closed, double paper) {
+std::optional<double> table_brightness(const SideOfPreview& side, const Image<float>& levels, double paper) {
   constexpr int rim = 4;  // cells
   std::vector<float> dark;
   std::size_t seen = 0;
@@ -79,7 +79,7 @@ std::optional<double> table_brightness(const SideOfPreview& side, const Image<fl
       if (std::isnan(side.at(side.preview.brightness, line, deep))) continue;
       ++in_rim;
       ++seen;
-      const float brightness = side.at(closed, line, deep);
+      const float brightness = side.at(levels, line, deep);
       if (brightness < (1 - least_contrast) * paper) dark.push_back(brightness);
     }
   if (dark.size() < 16 || double(dark.size()) < 0.2 * double(seen)) return std::nullopt;
@@ -88,12 +88,12 @@ std::optional<double> table_brightness(const SideOfPreview& side, const Image<fl
 
 /// Cells that belong to the page: brighter than the threshold, and in one piece with much of it or mostly measured. A
 /// ruler or colour target beside the page is neither.
-Image<char> find_paper(const FlatPreview& preview, const Image<float>& closed, double threshold) {
+Image<char> find_paper(const FlatPreview& preview, const Image<float>& cells, double threshold) {
   constexpr char unknown = 1;
   Image<char> paper(preview.width(), preview.height(), false);
   for (int y = 0; y < preview.height(); ++y)
     for (int x = 0; x < preview.width(); ++x)
-      if (closed(x, y) > threshold && !std::isnan(preview.brightness(x, y))) paper(x, y) = unknown;
+      if (cells(x, y) > threshold && !std::isnan(preview.brightness(x, y))) paper(x, y) = unknown;
   struct Piece {
     std::vector<std::pair<int, int>> cells;
     std::size_t measured = 0;
@@ -123,20 +123,27 @@ Image<char> find_paper(const FlatPreview& preview, const Image<float>& closed, d
   return paper;
 }
 
-/// The first paper on every line across a side. Lines on which there is no table in front of it are left out.
+/// The first paper on every line across a side. Lines on which less than 1.5 mm of table is seen in front of it are
+/// left out: there the scan may cut through the print.
 std::vector<EdgePoint> first_paper(const SideOfPreview& side, const Image<char>& paper) {
+  constexpr int least_table = 3;  // cells
   std::vector<EdgePoint> points;
   for (int line = 0; line < side.lines(); ++line) {
     int deep = 0;
     while (deep < side.depth() && !side.at(paper, line, deep)) ++deep;
-    if (deep == 0 || deep == side.depth() || std::isnan(side.at(side.preview.brightness, line, deep - 1))) continue;
+    if (deep < least_table || deep == side.depth()) continue;
+    if (std::isnan(side.at(side.preview.brightness, line, deep - least_table))) continue;
     points.push_back({line * side.preview.pitch_mm, (deep - 0.5) * side.preview.pitch_mm});
   }
   return points;
 }
 
+/// The light behind a brightness, near enough: pictures for people are encoded with a gamma of about 2.2. Half height
+/// is the edge's place in light only; in a picture that is linear already this errs by a fifth of a pixel, inwards.
+double light_of(double brightness) { return std::pow(brightness, 2.2); }
+
 /// The paper's edge on one line across it: where the profile rises most, at half height between the two sides' own
-/// brightness. Nothing if the rise is less than half of that from table to paper: printing, a photo, a shadow.
+/// light. Nothing if the rise is less than half of that from table to paper: printing, a photo, a shadow.
 std::optional<double> locate_edge(const PaperView& view, const Picture& scan, const SideOfPreview& side,
                                   double along_mm, double across_mm, double contrast) {
   constexpr double step_mm = 0.05;
@@ -144,7 +151,7 @@ std::optional<double> locate_edge(const PaperView& view, const Picture& scan, co
   std::vector<double> profile;
   for (int k = -reach; k <= reach; ++k) {
     const auto pixel = view.position(side.paper_at(along_mm, across_mm + k * step_mm));
-    profile.push_back(pixel ? brightness_at(scan, *pixel) : std::nan(""));
+    profile.push_back(pixel ? light_of(brightness_at(scan, *pixel)) : std::nan(""));
   }
   const auto mean = [&](int first) {
     double sum = 0;
@@ -185,18 +192,32 @@ EdgeLine locate_line(const PaperView& view, const Picture& scan, const SideOfPre
   return fine && fine->share * double(points.size()) * pitch_mm >= 0.5 * min_edge_mm ? *fine : coarse;
 }
 
+/// The preview without the print on it.
+struct Blanked {
+  Image<float> levels;  ///< spots of up to 2 mm filled: what is dark in it is not text
+  Image<float> cells;   ///< spots of up to 1 mm filled, but not the gap between the page and a ruler
+  double paper{};       ///< brightness of blank paper
+};
+
+Blanked blank_out(const FlatPreview& preview) {
+  Blanked blanked{close_dark_spots(preview.brightness, 2), close_dark_spots(preview.brightness, 1), 0};
+  blanked.paper = paper_brightness(preview, blanked.levels);
+  return blanked;
+}
+
 /// The paper's edge on one side as the scan shows it, or nothing.
 std::optional<EdgeLine> see_edge(const PaperView& view, const Picture& scan, const SideOfPreview& side,
-                                 const Image<float>& closed, double paper) {
-  const auto table = table_brightness(side, closed, paper);
+                                 const Blanked& blanked) {
+  const double paper = blanked.paper;
+  const auto table = table_brightness(side, blanked.levels, paper);
   if (!table) return std::nullopt;
   const double pitch = side.preview.pitch_mm;
-  const Image<char> mask = find_paper(side.preview, closed, 0.5 * (paper + *table));
+  const Image<char> mask = find_paper(side.preview, blanked.cells, 0.5 * (paper + *table));
   const auto points = first_paper(side, mask);
   const double length = std::max(min_edge_mm, 0.1 * side.lines() * pitch);
   const auto coarse = find_edge_line(points, pitch, pitch, length, max_turn_rad);
   if (!coarse) return std::nullopt;
-  return locate_line(view, scan, side, *coarse, paper - *table);
+  return locate_line(view, scan, side, *coarse, light_of(paper) - light_of(*table));
 }
 
 /// The end of the surface's grid: the preview's own at the gutter, reach_mm inside it elsewhere.
@@ -305,9 +326,7 @@ void add_margin(PageOutline& outline, double margin_mm) {
 }
 
 Sides find_sides(const PaperView& view, const Picture& scan, const FlatPreview& preview) {
-  constexpr int text_radius = 2;  // cells: 2.5 mm, more than most strokes
-  const Image<float> closed = close_dark_spots(preview.brightness, text_radius);
-  const double paper = paper_brightness(preview, closed);
+  const Blanked blanked = blank_out(preview);
   Sides sides;
   for (const PageSide side : all_sides) {
     const auto k = static_cast<std::size_t>(side);
@@ -315,7 +334,7 @@ Sides find_sides(const PaperView& view, const Picture& scan, const FlatPreview& 
     if (is_gutter(view.surface(), side)) {
       sides.lines[k] = surface_end(seen, true);
       sides.evidence[k] = OutlineEvidence::gutter;
-    } else if (const auto edge = see_edge(view, scan, seen, closed, paper)) {
+    } else if (const auto edge = see_edge(view, scan, seen, blanked)) {
       sides.lines[k] = *edge;
       sides.evidence[k] = OutlineEvidence::paper_edge;
     } else {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double degree = 3.14159265358979 / 180;
 
-/// A sheet of paper on a table, both in the (s, t) of the surface that they lie on.
+/// A sheet of paper on a table, both in the (s, t) of the surface that they lie on; brightness in linear light.
 struct Desk {
   PageFrame paper{{-50, -60}, 0, 100, 120};
   double table = 0.12;
@@ -51,6 +51,8 @@ struct Outlined {
       for (int i = 0; i < surface.columns(); ++i)
         if (!desk.paper.contains({surface.s_of(i), surface.t_of(j)})) surface.status(i, j) = PixelStatus::off_surface;
     scan = render_scan(sheet, scanner, desk, 2, channels, bit_depth);
+    for (int y = 0; y < scan.height(); ++y)  // as for a display
+      for (int x = 0; x < scan.width(); ++x) set_pixel(scan, x, y, std::pow(pixel_at(scan, x, y), 1 / 2.2));
   }
   PageOutline find(const OutlineOptions& options = {}) const {
     return find_page_outline(PaperView(surface, scanner, PaperShape::measured), scan, options);
