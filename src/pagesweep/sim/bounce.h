@@ -10,8 +10,8 @@
 namespace pagesweep::sim {
 
 struct BounceOptions {
-  double spacing_mm = 4;  ///< of the receiving places on what is measured; elsewhere six times as much
-  int rays = 512;         ///< that each of them sends out
+  double spacing_mm = 2.5;  ///< of the receiving places on what is measured; elsewhere six times as much
+  int rays = 512;           ///< that each of them sends out
 };
 
 /// Light that comes by way of one diffuse reflection elsewhere: at places a few millimetres apart on every surface, its

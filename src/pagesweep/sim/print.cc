@@ -143,6 +143,7 @@ class Press {
     const double step = 1.15 * size * mm_per_point * (heading ? 1 : design_.line_spacing);
     const auto layout = make_layout(text, size, heading);
     pango_layout_set_justify(layout.get(), !heading);
+    if (heading && below_ > design_.margin_top_mm) below_ += 0.8 * step;
     const Owned<PangoLayoutIter> lines(pango_layout_get_iter(layout.get()));
     std::size_t printed = 0;
     do {

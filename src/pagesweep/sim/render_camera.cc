@@ -3,7 +3,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <type_traits>
@@ -20,25 +20,37 @@ double cumulated_twice(double z) {
   return z * cumulative + std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi);
 }
 
-/// One ray of a pixel's bundle.
+constexpr int taps_per_side = 3;
+
+/// One ray of a pixel's bundle, which stands for a part of the spot that the pixel sees. The print is finer than the
+/// rays, so it is looked up at several taps of each part, whose places follow from the ray's own.
 struct SpotSample {
   Eigen::Vector2d offset_px;
-  double spacing_px;  ///< to its neighbours: the square root of its share of the picture
+  std::array<Eigen::Vector2f, taps_per_side * taps_per_side> taps_px;  ///< relative to offset_px
 };
 
 std::vector<SpotSample> spot_samples(int per_side, double psf_sigma_px) {
-  const std::vector<double> offsets = spot_offsets(per_side, psf_sigma_px);
-  const auto spacing = [&](int k) {
-    const int before = std::max(k - 1, 0), after = std::min(k + 1, per_side - 1);
-    if (before == after) return 1.0;
-    return (offsets[std::size_t(after)] - offsets[std::size_t(before)]) / (after - before);
-  };
+  const std::vector<double> offsets = spot_offsets(taps_per_side * per_side, psf_sigma_px);
+  const auto offset = [&](int part, int tap) { return offsets[std::size_t(taps_per_side * part + tap)]; };
+  const int middle = taps_per_side / 2;
   std::vector<SpotSample> samples;
   for (int j = 0; j < per_side; ++j)
-    for (int i = 0; i < per_side; ++i)
-      samples.push_back({{offsets[std::size_t(i)], offsets[std::size_t(j)]}, std::sqrt(spacing(i) * spacing(j))});
+    for (int i = 0; i < per_side; ++i) {
+      SpotSample& sample = samples.emplace_back();
+      sample.offset_px = {offset(i, middle), offset(j, middle)};
+      for (int tap = 0; tap < taps_per_side * taps_per_side; ++tap) {
+        const Eigen::Vector2d place(offset(i, tap % taps_per_side), offset(j, tap / taps_per_side));
+        sample.taps_px[std::size_t(tap)] = (place - sample.offset_px).cast<float>();
+      }
+    }
   return samples;
 }
+
+/// How paper coordinates and the stripe's time change across a pixel. Zero where it sees more than one surface.
+struct PixelSlopes {
+  Eigen::Matrix2f st_by_px = Eigen::Matrix2f::Zero();
+  Eigen::RowVector2f time_by_px = Eigen::RowVector2f::Zero();
+};
 
 /// Light of one surface within a pixel that is the same for all of the spot: it arrives from everywhere.
 struct SurfaceShare {
@@ -56,9 +68,9 @@ class CameraRenderer {
         rig_from_cam_(camera.cam_from_rig.inverse()),
         samples_(spot_samples(options.rays_per_side, options.psf_sigma_px)) {
     const double mm_per_px = rig_from_cam_.translation.z() / camera.fx;
-    for (const Surface& surface : lit.world.surfaces)
-      for (const SpotSample& sample : samples_)
-        levels_.push_back(surface.albedo.level_for(sample.spacing_px * mm_per_px));
+    const double spot_px = std::sqrt(1.0 / 12 + options.psf_sigma_px * options.psf_sigma_px);
+    const double tap_spacing_mm = 2.5 * spot_px * mm_per_px / (taps_per_side * options.rays_per_side);
+    for (const Surface& surface : lit.world.surfaces) levels_.push_back(surface.albedo.level_for(tap_spacing_mm));
   }
 
   struct Scratch {
@@ -72,18 +84,21 @@ class CameraRenderer {
     if (!aim(x, y, scratch.rays)) return;
     scratch.hits.resize(scratch.rays.size());
     lit_.caster.cast(scratch.rays, scratch.hits);
+    const PixelSlopes slopes = slopes_of(scratch.hits);
     std::array<SurfaceShare, 4> shares;  // a pixel that shows more surfaces than this loses the glow on the rest
     const float share_of_ray = static_cast<float>(options_.exposure) / static_cast<float>(samples_.size());
     for (std::size_t k = 0; k < samples_.size(); ++k) {
       const SimHit& hit = scratch.hits[k];
       if (hit.surface < 0) continue;
       const auto number = static_cast<std::size_t>(hit.surface);
-      const Surface& surface = lit_.world.surfaces[number];
-      const NodeLight light = light_at(lit_.direct[number], hit.spot);
-      const Eigen::Vector2f st = surface.mesh.parameters(hit.spot);
-      const float albedo = surface.albedo.at(st.x(), st.y(), levels_[number * samples_.size() + k]);
-      sweep(light, share_of_ray * (albedo * light.diffuse + light.gloss[viewer_]), frames);
-      collect(hit.surface, albedo, st, shares);
+      NodeLight light = light_at(lit_.direct[number], hit.spot);
+      const Eigen::Vector2f st = lit_.world.surfaces[number].mesh.parameters(hit.spot);
+      const float gloss = light.gloss[viewer_];
+      if (gloss > 0) sweep(light, share_of_ray * gloss, frames);
+      const Print print = look_up(number, st, samples_[k], slopes);
+      light.time += print.later;
+      sweep(light, share_of_ray * print.albedo * light.diffuse, frames);
+      collect(hit.surface, print.albedo, st, shares);
     }
     for (const SurfaceShare& share : shares) {
       if (share.rays == 0) continue;
@@ -108,6 +123,47 @@ class CameraRenderer {
                       (rig_from_cam_.rotation * Eigen::Vector3d(direction.x(), direction.y(), 1)).cast<float>()});
     }
     return true;
+  }
+
+  /// From the rays beside the middle one.
+  PixelSlopes slopes_of(std::span<const SimHit> hits) const {
+    const int side = options_.rays_per_side;
+    const int low = std::max(side / 2 - 1, 0), high = std::min(side / 2 + 1, side - 1);
+    const auto number = [&](int i, int j) { return static_cast<std::size_t>(j * side + i); };
+    const std::array<std::size_t, 4> ends{number(low, side / 2), number(high, side / 2), number(side / 2, low),
+                                          number(side / 2, high)};
+    PixelSlopes slopes;
+    const int surface = hits[ends[0]].surface;
+    const bool is_one = std::ranges::all_of(hits, [&](const SimHit& hit) { return hit.surface == surface; });
+    if (surface < 0 || !is_one || low == high) return slopes;
+    const GridMesh& mesh = lit_.world.surfaces[std::size_t(surface)].mesh;
+    for (int axis : {0, 1}) {
+      const std::size_t from = ends[std::size_t(2 * axis)], to = ends[std::size_t(2 * axis + 1)];
+      const auto span = static_cast<float>(samples_[to].offset_px[axis] - samples_[from].offset_px[axis]);
+      slopes.st_by_px.col(axis) = (mesh.parameters(hits[to].spot) - mesh.parameters(hits[from].spot)) / span;
+      const auto& nodes = lit_.direct[std::size_t(surface)];
+      slopes.time_by_px[axis] = (light_at(nodes, hits[to].spot).time - light_at(nodes, hits[from].spot).time) / span;
+    }
+    return slopes;
+  }
+
+  /// What one part of the spot shows: its mean albedo, and how much later [frames] than its ray's the stripe passes the
+  /// centre of what is bright in it.
+  struct Print {
+    float albedo = 0, later = 0;
+  };
+  Print look_up(std::size_t surface, const Eigen::Vector2f& st, const SpotSample& sample,
+                const PixelSlopes& slopes) const {
+    const Texture& texture = lit_.world.surfaces[surface].albedo;
+    if (texture.is_constant()) return {texture.at(0, 0, 0), 0};
+    float albedo = 0, later = 0;
+    for (const Eigen::Vector2f& tap : sample.taps_px) {
+      const Eigen::Vector2f place = st + slopes.st_by_px * tap;
+      const float here = texture.at(place.x(), place.y(), levels_[surface]);
+      albedo += here;
+      later += here * slopes.time_by_px.dot(tap);
+    }
+    return {albedo / static_cast<float>(sample.taps_px.size()), albedo > 0 ? later / albedo : 0};
   }
 
   /// The stripe passes a spot.
@@ -138,7 +194,7 @@ class CameraRenderer {
   const CameraOptions& options_;
   Rigid3 rig_from_cam_;
   std::vector<SpotSample> samples_;
-  std::vector<int> levels_;  ///< of the texture, by surface and sample
+  std::vector<int> levels_;  ///< of the texture, by surface
 };
 
 template <class Pixel>
@@ -183,6 +239,11 @@ std::vector<double> spot_offsets(int count, double psf_sigma_px) {
     }
     offsets.push_back(0.5 * (low + high));
   }
+  // The parts' own widths are missing in the variance of their medians.
+  double variance = 0;
+  for (const double offset : offsets) variance += offset * offset / count;
+  const double stretch = count > 1 ? std::sqrt((1.0 / 12 + sigma * sigma) / variance) : 1;
+  for (double& offset : offsets) offset *= stretch;
   return offsets;
 }
 

@@ -24,7 +24,7 @@ struct LitWorld {
 };
 
 struct CameraOptions {
-  int rays_per_side = 7;       ///< a pixel is sampled with the square of it
+  int rays_per_side = 8;       ///< a pixel is sampled with the square of it
   double psf_sigma_px = 0.45;  ///< the lens' Gaussian point spread, on top of the pixel's own area
   double exposure = 0.83;      ///< share of the full well that a perfectly white level spot at the table's origin fills
   double ambient = 0.01;       ///< steady light, in units of the stripe's there

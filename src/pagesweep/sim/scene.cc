@@ -98,7 +98,7 @@ Scene preview_of(Scene scene) {
                    .page_dpi = 100,
                    .bar_samples = 24,
                    .points_subsampling = 4,
-                   .bounce = {.spacing_mm = 8, .rays = 256}};
+                   .bounce = {.spacing_mm = 4, .rays = 256}};
   return scene;
 }
 

@@ -46,12 +46,12 @@ void add_page(const ScenePage& page, const RenderQuality& quality, Stage& stage,
 Stage build_stage(const Scene& scene, Progress& progress) {
   progress.begin("bending and printing the paper");
   Stage stage;
-  stage.world.surfaces.push_back({.mesh = make_rectangle({-340, -280, 0}, 680, 560, 4 * scene.quality.mesh_mm),
+  stage.world.surfaces.push_back({.mesh = make_rectangle({-340, -280, 0}, 680, 560, 3 * scene.quality.mesh_mm),
                                   .albedo = Texture(static_cast<float>(scene.table_albedo))});
   for (const ScenePage& page : scene.pages) add_page(page, scene.quality, stage, progress);
   for (const SceneSphere& sphere : scene.spheres)
     stage.world.surfaces.push_back(
-        {.mesh = make_sphere(sphere.center_mm, sphere.radius_mm, 0.4 * scene.quality.mesh_mm),
+        {.mesh = make_sphere(sphere.center_mm, sphere.radius_mm, 0.3 * scene.quality.mesh_mm),
          .albedo = Texture(static_cast<float>(sphere.albedo)),
          .gloss = sphere.gloss,
          .is_measured = true});

@@ -16,6 +16,7 @@ class Texture {
   /// \param albedo  texel (i, j) is centred at s = (i + 0.5) / texels_per_mm, t = (j + 0.5) / texels_per_mm
   Texture(Image<float> albedo, double texels_per_mm);
 
+  bool is_constant() const { return levels_.empty(); }
   /// The level whose texels are about as large as a footprint.
   int level_for(double footprint_mm) const;
   float at(float s_mm, float t_mm, int level) const;
