@@ -114,7 +114,7 @@ struct Cone {
 };
 
 TEST(FitSurface, UnrollsACone) {
-  const auto points = measure({Cone::height, 60, -20});
+  const auto points = measure({Cone::height, 56, -8}, {.width_px = 192});
   for (const SurfaceModel model : {SurfaceModel::cylinder, SurfaceModel::developable}) {
     const auto pages = fit_surface(points, {.model = model});
     ASSERT_EQ(pages.size(), 1u);
@@ -142,7 +142,7 @@ struct CurledCorners {
 };
 
 TEST(FitSurface, LaysFlatByTheMeasurementWhatNoModelDescribes) {
-  const auto points = measure({CurledCorners::height, 60, 0});
+  const auto points = measure({CurledCorners::height, 40, 8}, {.width_px = 192});
   const auto model = fit_surface(points, {.model = SurfaceModel::cylinder, .layout = Layout::single});
   const auto free = fit_surface(points, {.model = SurfaceModel::developable, .layout = Layout::single});
   ASSERT_EQ(model.size(), 1u);
@@ -163,7 +163,7 @@ TEST(FitSurface, FindsTheGutterOfABookThatIsOpenAtItsFirstPage) {
     const double z = book.height(x, y);
     return x < book.gutter_p_mm && !std::isnan(z) ? book.bottom_mm : z;
   };
-  EXPECT_EQ(fit_surface(measure({height, 60, 0})).size(), 2u);
+  EXPECT_EQ(fit_surface(measure({height, 50, 5}, {.width_px = 160})).size(), 2u);
 }
 
 TEST(FitSurface, FollowsADentThatTheModelMisses) {
@@ -217,7 +217,7 @@ TEST(FitSurface, ReadsInAnyDirection) {
     const double angle = quarter * std::numbers::pi / 2;
     scenes::OpenBook book;
     book.turn_rad += angle;
-    const auto pages = fit_surface(measure(book.scene()), {.reading_direction_rad = angle});
+    const auto pages = fit_surface(measure(book.scene(), {.width_px = 192}), {.reading_direction_rad = angle});
     expect_book(pages, book);
     for (const PageSurface& page : pages) {
       const auto error = flattening_error(
@@ -234,7 +234,7 @@ double folded_letter(double x, double y) {
 }
 
 TEST(FitSurface, LeavesAFoldedLetterWhole) {
-  const auto pages = fit_surface(measure({folded_letter, 60, 0}));
+  const auto pages = fit_surface(measure({folded_letter, 21, 3}));
   ASSERT_EQ(pages.size(), 1u);
   const auto error = flattening_error(pages[0], pages[0].measured, [](double x, double y) -> Eigen::Vector2d {
     if (std::isnan(folded_letter(x, y))) return no_paper;
@@ -255,7 +255,7 @@ TEST(FitSurface, LeavesTheDarkTableAside) {
     if (std::isnan(book.height(x, y))) return 15.0;
     return x > 60 && y < -40 ? 12.0 : 100.0;
   };
-  const auto pages = fit_surface(measure({with_table, 60, -5}, {.brightness = brightness}));
+  const auto pages = fit_surface(measure({with_table, 50, -2}, {.width_px = 192, .brightness = brightness}));
   expect_book(pages, book);
   for (const PageSurface& page : pages) {
     EXPECT_NEAR(page.s_of(page.columns() - 1) - page.s0_mm, 148, 5);

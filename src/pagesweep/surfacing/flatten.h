@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 
+#include "pagesweep/base/catmull_rom.h"
 #include "pagesweep/base/image.h"
 
 namespace pagesweep {
@@ -39,12 +40,8 @@ T interpolate_nodes(const Image<T>& nodes, double i, double j) {
   const int j0 = static_cast<int>(std::clamp(std::floor(j), 0.0, std::max(0.0, nodes.height() - 2.0)));
   // The four nodes' weights; nodes beyond the border are extrapolated from the two at it.
   const auto weights = [](double x, int first, int count) {
-    std::array<double, 4> w;
-    if (x < 0 || x > 1)
-      w = {0, 1 - x, x, 0};
-    else
-      w = {x * (-0.5 + x * (1 - 0.5 * x)), 1 + x * x * (-2.5 + 1.5 * x), x * (0.5 + x * (2 - 1.5 * x)),
-           x * x * (-0.5 + 0.5 * x)};
+    std::array<double, 4> w{0, 1 - x, x, 0};
+    if (x >= 0 && x <= 1) w = catmull_rom_weights(x);
     if (first == 0) w = {0, w[1] + 2 * w[0], w[2] - w[0], w[3]};
     if (first + 2 >= count) w = {w[0], w[1] - w[3], w[2] + 2 * w[3], 0};
     return w;
