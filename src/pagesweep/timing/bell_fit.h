@@ -41,7 +41,7 @@ enum class BellUnknowns {
 struct BellFitOptions {
   BellUnknowns unknowns = BellUnknowns::basic;
   double log_width_sigma = 0.2;  ///< standard deviation of log width around the start value
-  int most_iterations = 12;
+  int most_iterations = 12;      ///< after 1, the covariance is that of the start values
 };
 
 struct BellFit {

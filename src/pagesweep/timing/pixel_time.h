@@ -21,9 +21,9 @@ struct PixelJudge {
   const StripeProfile& profile;
   SensorNoise noise;
   int frame_count = 0;
-  double min_amplitude = 0;  ///< [gray values]
-  double max_sigma = 0.5;    ///< [frames]
-  bool doubt = true;         ///< bells that do not fit are refused
+  double min_amplitude = 0;    ///< [gray values]
+  double max_sigma = 0.5;      ///< [frames]
+  bool refuse_misfits = true;  ///< bells that do not fit are corrected or refused
 };
 
 /// Centre of mass of what rises above a fifth of the bell's height, background removed. Clipped samples count as the
