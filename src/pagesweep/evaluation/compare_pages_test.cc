@@ -65,6 +65,13 @@ TEST(ScanMapInverse, OfAMapOfNothingFindsNothing) {
   EXPECT_FALSE(ScanMapInverse(empty)({10, 10}));
 }
 
+TEST(ScanMapInverse, OneStrayValueLosesNoMoreThanItself) {
+  ScanMap map = map_of(100, 120, 4, as_it_is);
+  map.u(36, 24) = 1e37f;
+  const ScanMapInverse inverse(map);
+  EXPECT_FALSE(inverse({1e37, 100}));
+}
+
 TEST(ComparePages, TheTruthOnAnotherPaperSizeHasNoError) {
   const PageErrors errors =
       compare([](const Eigen::Vector2d& p) -> Eigen::Vector2d { return p - Eigen::Vector2d(4, 6); });

@@ -38,8 +38,9 @@ std::vector<Sample> gather(const PointMap& points, int x, int y, const Eigen::Ve
   const Eigen::Vector3d across_b = to_camera.cross(across_a);
   std::vector<Sample> samples;
   // Rings of pixels around the centre, until one lies outside the neighbourhood as a whole.
+  constexpr int most_rings = 60;
   bool ring_reaches_in = true;
-  for (int ring = 0; ring_reaches_in; ++ring) {
+  for (int ring = 0; ring_reaches_in && ring < most_rings; ++ring) {
     ring_reaches_in = ring == 0;
     for (int j = y - ring; j <= y + ring; ++j)
       for (int i = x - ring; i <= x + ring; i += std::abs(j - y) == ring ? 1 : std::max(1, 2 * ring)) {

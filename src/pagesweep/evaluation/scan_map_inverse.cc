@@ -64,9 +64,10 @@ ScanMapInverse::ScanMapInverse(const ScanMap& map) : map_(map) {
       high = high.cwiseMax(scan);
     }
   if (nodes.empty()) return;
-  // About two nodes a bucket, so that the 3 x 3 buckets around a place hold its neighbours.
+  // About two nodes a bucket, so that the buckets around a place hold its neighbours; never more than a million
+  // buckets, whatever stray values a file may hold.
   const Eigen::Vector2d size = (high - low_).cwiseMax(1);
-  cell_px_ = std::max(1.0, std::sqrt(2 * size.prod() / static_cast<double>(nodes.size())));
+  cell_px_ = std::max({1.0, std::sqrt(2 * size.prod() / static_cast<double>(nodes.size())), size.maxCoeff() / 1000});
   columns_ = static_cast<int>(size.x() / cell_px_) + 1;
   rows_ = static_cast<int>(size.y() / cell_px_) + 1;
   buckets_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
