@@ -12,7 +12,7 @@ namespace pagesweep {
 namespace {
 
 constexpr int most_steps = 12;
-constexpr double settled_mm = 1e-7;
+constexpr double settled_mm = 1e-5;
 
 struct Edge {
   int from, to;  // node numbers

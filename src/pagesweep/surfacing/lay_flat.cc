@@ -33,43 +33,51 @@ Range alpha_range(const RuledSurface& model, std::span<const Support> places, Gu
 
 }  // namespace
 
-CutLength::CutLength(const RuledSurface& surface, double from, double to) : surface_(surface), from_(from) {
+CutLength::CutLength(const RuledSurface& surface, double from, double to) : from_(from) {
   const int steps = std::max(2, static_cast<int>(std::ceil((to - from) / 0.25)));
   step_ = (to - from) / steps;
+  const double b = 0.5 * (surface.b_low + surface.b_high);
+  const auto speed = [&](double alpha) { return std::hypot(1 + surface.frame.fan * b, surface.at(alpha, b).slope); };
   lengths_.push_back(0);
-  for (int k = 0; k < steps; ++k) {
+  speeds_.push_back(speed(from));
+  for (int k = 1; k <= steps; ++k) {
     const double a = from + k * step_;
-    lengths_.push_back(lengths_.back() + step_ / 6 * (speed(a) + 4 * speed(a + 0.5 * step_) + speed(a + step_)));
+    speeds_.push_back(speed(a));
+    const double simpson = speeds_.rbegin()[1] + 4 * speed(a - 0.5 * step_) + speeds_.back();
+    lengths_.push_back(lengths_.back() + step_ / 6 * simpson);
   }
   const double origin = length_at(0);
   for (double& length : lengths_) length -= origin;
 }
 
-double CutLength::speed(double alpha) const {
-  const double b = 0.5 * (surface_.b_low + surface_.b_high);
-  return std::hypot(1 + surface_.frame.fan * b, surface_.at(alpha, b).slope);
+CutLength::Place CutLength::place(std::size_t k, double x) const {
+  const double rise = lengths_[k + 1] - lengths_[k];
+  const double v0 = step_ * speeds_[k], v1 = step_ * speeds_[k + 1];
+  const double c2 = 3 * rise - 2 * v0 - v1, c3 = v0 + v1 - 2 * rise;  // cubic Hermite interpolation
+  return {lengths_[k] + x * (v0 + x * (c2 + x * c3)), v0 + x * (2 * c2 + 3 * x * c3)};
 }
 
 double CutLength::length_at(double alpha) const {
   const auto last = static_cast<double>(lengths_.size()) - 1;
-  const double k = std::clamp(std::floor((alpha - from_) / step_), 0.0, last - 1);
-  const double begin = from_ + k * step_, x = alpha - begin;
-  const double length = lengths_[static_cast<std::size_t>(k)];
-  if (x < 0) return length + x * speed(from_);
-  if (x > step_) return lengths_.back() + (x - step_) * speed(from_ + last * step_);
-  return length + x / 6 * (speed(begin) + 4 * speed(begin + 0.5 * x) + speed(alpha));
+  const double position = (alpha - from_) / step_;
+  if (position < 0) return lengths_.front() + position * step_ * speeds_.front();
+  if (position > last) return lengths_.back() + (position - last) * step_ * speeds_.back();
+  const double k = std::min(std::floor(position), last - 1);
+  return place(static_cast<std::size_t>(k), position - k).length_mm;
 }
 
 double CutLength::alpha_at(double length_mm) const {
+  const auto last = static_cast<double>(lengths_.size()) - 1;
+  if (length_mm < lengths_.front()) return from_ + (length_mm - lengths_.front()) / speeds_.front();
+  if (length_mm > lengths_.back()) return from_ + last * step_ + (length_mm - lengths_.back()) / speeds_.back();
   const auto above = std::upper_bound(lengths_.begin() + 1, lengths_.end() - 1, length_mm);
-  const auto k = static_cast<double>(above - lengths_.begin() - 1);
-  double alpha = from_ + (k + 0.5) * step_;
-  for (int step = 0; step < 5; ++step) {
-    const double missing = length_mm - length_at(alpha);
-    alpha += missing / speed(alpha);
-    if (std::abs(missing) < 1e-10) break;
+  const auto k = static_cast<std::size_t>(above - lengths_.begin() - 1);
+  double x = (length_mm - lengths_[k]) / (lengths_[k + 1] - lengths_[k]);
+  for (int newton = 0; newton < 3; ++newton) {
+    const Place here = place(k, x);
+    x += (length_mm - here.length_mm) / here.slope;
   }
-  return alpha;
+  return from_ + (static_cast<double>(k) + x) * step_;
 }
 
 FlatPage::FlatPage(const RuledSurface& model, const Differences& differences, std::span<const Support> places,
@@ -201,7 +209,7 @@ Eigen::Vector2d FlatPage::node_at(const Eigen::Vector2d& paper, Eigen::Vector2d 
   return guess;
 }
 
-PageSurface FlatPage::sample_at(double spacing_mm, const PlanFrame& frame) const {
+PageSurface FlatPage::sample_model(double spacing_mm) const {
   PageSurface page;
   page.spacing_mm = spacing_mm;
   const int columns = static_cast<int>(std::ceil((high_.x() - low_.x()) / spacing_mm)) + 1;
@@ -211,21 +219,37 @@ PageSurface FlatPage::sample_at(double spacing_mm, const PlanFrame& frame) const
   page.s0_mm = gutter_ == GutterSide::right ? high_.x() - (columns - 1) * spacing_mm : low_.x();
   page.gutter_at_left = gutter_ == GutterSide::left;
   page.gutter_at_right = gutter_ == GutterSide::right;
-  page.model = page.measured = Image<Eigen::Vector3f>(columns, rows, Eigen::Vector3f::Zero());
-  page.sigma = Image<float>(columns, rows, not_a_number);
-  page.status = Image<PixelStatus>(columns, rows, PixelStatus::not_computed);
-  const Eigen::Vector2d middle(0.5 * (columns_ - 1), 0.5 * (rows_ - 1));
-  parallel_rows(rows, [&](int j) {
-    Eigen::Vector2d node = middle;
-    for (int i = 0; i < columns; ++i) {
-      node = node_at({page.s_of(i), page.t_of(j)}, node);
-      const Eigen::Vector3d measured = above(node.x(), node.y());
-      page.measured(i, j) = frame.rig_from_plan(measured).cast<float>();
-      page.model(i, j) = frame.rig_from_plan(surface_point(node.x(), node.y())).cast<float>();
-      look_up_status(measured, model_normal(node.x(), node.y()).z(), page.sigma(i, j), page.status(i, j));
-    }
+  page.model = Image<Eigen::Vector3f>(columns, rows, Eigen::Vector3f::Zero());
+  for_each_node(page, [&](int i, int j, const Eigen::Vector2d& node) {
+    page.model(i, j) = surface_point(node.x(), node.y()).cast<float>();
   });
   return page;
+}
+
+PageSurface FlatPage::sample(const PlanFrame& frame) const {
+  PageSurface page = sample_model(spacing_mm_);
+  page.measured = page.model;
+  page.sigma = Image<float>(page.columns(), page.rows(), not_a_number);
+  page.status = Image<PixelStatus>(page.columns(), page.rows(), PixelStatus::not_computed);
+  for_each_node(page, [&](int i, int j, const Eigen::Vector2d& node) {
+    const Eigen::Vector3d normal = model_normal(node.x(), node.y());
+    const Eigen::Vector3d measured = measured_above(model_, differences_, model_point(node.x(), node.y()), normal);
+    look_up_status(measured, normal.z(), page.sigma(i, j), page.status(i, j));
+    page.measured(i, j) = frame.rig_from_plan(measured).cast<float>();
+    page.model(i, j) = frame.rig_from_plan(page.model(i, j).cast<double>()).cast<float>();
+  });
+  return page;
+}
+
+template <class Use>
+void FlatPage::for_each_node(const PageSurface& page, const Use& use) const {
+  parallel_rows(page.rows(), [&](int j) {
+    Eigen::Vector2d node(0.5 * (columns_ - 1), 0.5 * (rows_ - 1));
+    for (int i = 0; i < page.columns(); ++i) {
+      node = node_at({page.s_of(i), page.t_of(j)}, node);
+      use(i, j, node);
+    }
+  });
 }
 
 bool FlatPage::is_measured(const Eigen::Vector3d& point) const {
@@ -261,12 +285,9 @@ double FlatPage::interpolation_error(const PageSurface& page) const {
 
 double FlatPage::fine_enough_spacing() const {
   double spacing = coarsest_spacing_mm;
-  while (0.75 * spacing > finest_spacing_mm &&
-         interpolation_error(sample_at(spacing, PlanFrame{})) > interpolation_error_mm)
+  while (0.75 * spacing > finest_spacing_mm && interpolation_error(sample_model(spacing)) > interpolation_error_mm)
     spacing *= 0.75;
   return spacing;
 }
-
-PageSurface FlatPage::sample(const PlanFrame& frame) const { return sample_at(spacing_mm_, frame); }
 
 }  // namespace pagesweep

@@ -20,11 +20,13 @@ class CutLength {
   double alpha_at(double length_mm) const;
 
  private:
-  double speed(double alpha) const;  ///< d length / d alpha
+  struct Place {
+    double length_mm, slope;  // slope: d length / d x
+  };
+  Place place(std::size_t k, double x) const;  // within step k, 0 <= x <= 1
 
-  const RuledSurface& surface_;
-  double from_, step_;
-  std::vector<double> lengths_;
+  double from_ = 0, step_ = 1;
+  std::vector<double> lengths_, speeds_;  // at from_ + k step_; speed: d length / d alpha
 };
 
 /// Which end of a page is the gutter.
@@ -53,7 +55,9 @@ class FlatPage {
   void turn_upright();
   void find_outline();
   Eigen::Vector2d node_at(const Eigen::Vector2d& paper, Eigen::Vector2d guess) const;
-  PageSurface sample_at(double spacing_mm, const PlanFrame& frame) const;
+  template <class Use>
+  void for_each_node(const PageSurface& page, const Use& use) const;
+  PageSurface sample_model(double spacing_mm) const;  // in plan coordinates, `model` alone
   double interpolation_error(const PageSurface& page) const;
   double fine_enough_spacing() const;
   bool is_measured(const Eigen::Vector3d& point) const;
