@@ -8,21 +8,18 @@
 namespace pagesweep {
 namespace {
 
-/// A^T A, A^T b and b^T b of eq. 9.
+/// A^T A, A^T b and b^T b of eq. 9, as sums over the rows (f, 1, s) . x = y.
 struct NormalEquations {
-  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  double squares = 0;
+  double ff = 0, f1 = 0, fs = 0, s1 = 0, ss = 0, fy = 0, y1 = 0, sy = 0, yy = 0;
   int rows = 0;
 
-  void add(double f, double g, double step, int start) {
-    const Eigen::Vector3d row(f, 1, step);
-    const double value = g - start * step;
-    matrix += row * row.transpose();
-    right += value * row;
-    squares += value * value;
+  void add(double f, double s, double y) {
+    ff += f * f, f1 += f, fs += f * s, s1 += s, ss += s * s;
+    fy += f * y, y1 += y, sy += s * y, yy += y * y;
     ++rows;
   }
+  Eigen::Matrix3d matrix() const { return Eigen::Matrix3d{{ff, f1, fs}, {f1, double(rows), s1}, {fs, s1, ss}}; }
+  Eigen::Vector3d right() const { return {fy, y1, sy}; }
 };
 
 }  // namespace
@@ -36,15 +33,16 @@ std::optional<Shift> solve_shift(std::span<const float> f, std::span<const float
     const float f_k = f[static_cast<std::size_t>(k)];
     const float g_k = g[static_cast<std::size_t>(start + k)];
     const float step = g[static_cast<std::size_t>(start + k + 1)] - g_k;
-    if (std::isfinite(f_k) && std::isfinite(g_k) && std::isfinite(step)) equations.add(f_k, g_k, step, start);
+    if (std::isfinite(f_k) && std::isfinite(g_k) && std::isfinite(step))
+      equations.add(f_k, step, g_k - static_cast<double>(start) * step);
   }
   if (equations.rows < fewest_rows) return std::nullopt;
-  const Eigen::LDLT<Eigen::Matrix3d> solver(equations.matrix);
-  const Eigen::Vector3d x = solver.solve(equations.right);
+  const Eigen::LDLT<Eigen::Matrix3d> solver(equations.matrix());
+  const Eigen::Vector3d x = solver.solve(equations.right());
   const double variance_factor = solver.solve(Eigen::Vector3d::UnitZ()).z();
   // No usable gray value has a relative precision of 1e-9: beyond that the rows say nothing about c.
   if (!x.allFinite() || !(variance_factor > 0) || solver.rcond() < 1e-14) return std::nullopt;
-  const double left = std::max(0.0, equations.squares - x.dot(equations.right));
+  const double left = std::max(0.0, equations.yy - x.dot(equations.right()));
   // A residual is (1 - q) n_k + q n_{k+1}, q = c - c~: over all q, on average 2/3 of a sample's variance. And the noise
   // in the column of differences, twice that variance a row, passes for slope: it makes c look more certain than it is.
   const double variance = 1.5 * left / (equations.rows - 3);
@@ -65,6 +63,7 @@ std::optional<Shift> refine_shift(std::span<const float> f, std::span<const floa
     const int proposed = std::clamp(static_cast<int>(std::floor(best->c)), start - reach, start + reach);
     int next = start;
     for (const int candidate : {proposed, start - 1, start + 1}) {
+      if (candidate == start || candidate == next) continue;
       const auto shift = solve_shift(f, g, candidate);
       if (!shift || shift->residual_rms >= best->residual_rms) continue;
       best = shift;
