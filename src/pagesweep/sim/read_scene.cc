@@ -10,6 +10,7 @@
 #include "pagesweep/io/atomic_file.h"
 #include "pagesweep/io/json_reader.h"
 #include "pagesweep/sim/scene.h"
+#include "pagesweep/sim/scene_fields.h"
 #include "pagesweep/sim/viewpoint.h"
 
 namespace pagesweep::sim {
@@ -333,6 +334,7 @@ void read_scanner(const JsonReader& json, Scene& scene) {
 Scene read_scene(const std::filesystem::path& file) {
   const JsonReader json = JsonReader::read(file);
   json.expect_format("pagesweep-scene", 1);
+  require_known_scene_fields(file);
   Scene scene;
   scene.rig = make_default_rig();
   if (const auto about = json.find("about")) scene.about = about->text();

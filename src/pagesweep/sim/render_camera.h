@@ -39,7 +39,7 @@ Frames render_camera(const LitWorld& lit, const Camera& camera, int viewer, cons
                      const SensorModel& sensor, std::uint64_t seed, Progress& progress = no_progress());
 
 /// Offsets [px] that cut the distribution of a pixel's area widened by a Gaussian into `count` parts of equal weight:
-/// the medians of the parts.
+/// the medians of the parts, stretched to the variance of the whole.
 std::vector<double> spot_offsets(int count, double psf_sigma_px);
 
 /// Rig-frame point [mm] that each pixel's centre ray hits; NaN where it hits nothing that is measured.
