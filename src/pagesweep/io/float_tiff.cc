@@ -70,9 +70,8 @@ void set_tags(TIFF* tiff, int width, int height, int channels) {
   TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, channels == 3 ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK);
   TIFFSetField(tiff, TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
   TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(rows_per_strip));
-  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
-  TIFFSetField(tiff, TIFFTAG_PREDICTOR, PREDICTOR_FLOATINGPOINT);
-  TIFFSetField(tiff, TIFFTAG_ZIPQUALITY, 4);
+  // Deflate needs the floating point predictor to gain anything, and few programs know that one.
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);
   const int color_channels = channels == 3 ? 3 : 1;
   if (channels > color_channels) {
     const std::vector<std::uint16_t> extra(static_cast<std::size_t>(channels - color_channels),

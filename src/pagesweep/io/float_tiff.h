@@ -21,7 +21,7 @@ std::vector<Image<float>> read_float_tiff(const std::filesystem::path& file);
 /// Likewise, with an error if the number of channels is another.
 std::vector<Image<float>> read_float_tiff(const std::filesystem::path& file, int channels);
 
-/// Writes channels of one size as an interleaved float32 TIFF, deflated.
+/// Writes channels of one size as an interleaved float32 TIFF, uncompressed: every program reads it.
 /// \throws Error  if it cannot be written
 /// \throws std::invalid_argument  if there is no channel or their sizes differ
 void write_float_tiff(const std::filesystem::path& file, std::span<const ImageView<const float>> channels);
