@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -38,10 +39,16 @@ double measured_share(const PageSurface& surface, const PageFrame& frame) {
   return nodes > 0 ? measured / nodes : 0;
 }
 
-double choose_pixels_per_mm(const PaperView& view, const PageFrame& frame, const Picture& scan,
-                            const DewarpOptions& options) {
+/// One resolution for all pages: the one asked for, the scan's own, or, of a scan that knows none, the finest at which
+/// it shows a page, in whole dpi.
+double choose_pixels_per_mm(std::span<const PaperView> views, std::span<const PageOutline> outlines,
+                            const Picture& scan, const DewarpOptions& options) {
   if (options.dpi > 0) return options.dpi / mm_per_inch;
-  return scan.pixels_per_mm > 0 ? scan.pixels_per_mm : scan_pixels_per_mm(view, frame);
+  if (scan.pixels_per_mm > 0) return scan.pixels_per_mm;
+  double finest = 0;
+  for (std::size_t k = 0; k < views.size(); ++k)
+    finest = std::max(finest, scan_pixels_per_mm(views[k], outlines[k].frame));
+  return std::max(1.0, std::round(finest * mm_per_inch)) / mm_per_inch;
 }
 
 void warn_of_missing_edges(const PageOutline& outline, int index, Progress& progress) {
@@ -53,18 +60,14 @@ void warn_of_missing_edges(const PageOutline& outline, int index, Progress& prog
                       index, name_of(side)));
 }
 
-Page dewarp_page(const PaperView& view, const Occlusion& occlusion, const Picture& scan, const DewarpOptions& options,
-                 Progress& progress) {
-  const PageSurface& surface = view.surface();
-  const PageOutline outline = find_page_outline(view, scan, {options.deskew, options.crop, options.margin_mm});
-  warn_of_missing_edges(outline, surface.index, progress);
-  const double pixels_per_mm = choose_pixels_per_mm(view, outline.frame, scan, options);
+Page make_page(const PaperView& view, const Occlusion& occlusion, const PageOutline& outline, double pixels_per_mm,
+               const Picture& scan, const ResampleOptions& resampling) {
   Page page;
-  page.index = surface.index;
+  page.index = view.surface().index;
   page.scan_map = build_scan_map(view, occlusion, outline.frame, pixels_per_mm);
-  page.picture = resample(scan, page.scan_map, pixels_per_mm, options.resampling);
+  page.picture = resample(scan, page.scan_map, pixels_per_mm, resampling);
   page.deskew_rad = outline.frame.angle_rad;
-  page.measured_share = measured_share(surface, outline.frame);
+  page.measured_share = measured_share(view.surface(), outline.frame);
   return page;
 }
 
@@ -76,12 +79,18 @@ std::vector<Page> dewarp(std::span<const PageSurface> surfaces, const Picture& s
   progress.begin("flat pages");
   const PaperShape shape = options.difference_vector ? PaperShape::measured : PaperShape::model;
   std::vector<PaperView> views;
-  for (const PageSurface& surface : surfaces) views.emplace_back(surface, scanner, shape);
+  std::vector<PageOutline> outlines;
+  for (const PageSurface& surface : surfaces) {
+    views.emplace_back(surface, scanner, shape);
+    outlines.push_back(find_page_outline(views.back(), scan, {options.deskew, options.crop, options.margin_mm}));
+    warn_of_missing_edges(outlines.back(), surface.index, progress);
+  }
+  const double pixels_per_mm = choose_pixels_per_mm(views, outlines, scan, options);
   const Occlusion occlusion(views);
   std::vector<Page> pages;
-  for (const PaperView& view : views) {
-    pages.push_back(dewarp_page(view, occlusion, scan, options, progress));
-    progress.advance(double(pages.size()) / double(views.size()));
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    pages.push_back(make_page(views[k], occlusion, outlines[k], pixels_per_mm, scan, options.resampling));
+    progress.advance(double(k + 1) / double(views.size()));
   }
   return pages;
 }

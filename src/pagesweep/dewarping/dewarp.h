@@ -23,7 +23,7 @@ struct DewarpOptions {
 
   template <class Visitor>
   void describe(Visitor&& visit) {
-    visit("dpi", dpi, "pixels per inch", "resolution of the pages; 0: that of the scan");
+    visit("dpi", dpi, "pixels per inch", "resolution of the pages; 0: that of the scan, from its file or its geometry");
     visit("difference-vector", difference_vector, "",
           "correct the surface model by the measured deviations from it (eq. 12)");
     visit("deskew", deskew, "", "turn the page upright by its edges or its text lines");
