@@ -67,6 +67,25 @@ Image<float> brightest(const Frames& frames) {
   return picture;
 }
 
+Image<std::uint8_t> count_clipped(const Frames& frames) {
+  Image<std::uint8_t> counts(frames.width(), frames.height());
+  const double saturation = frames.sequence().saturation;
+  parallel_rows(frames.height(), [&](int y) {
+    const auto out = counts.row(y);
+    for (int i = 0; i < frames.count(); ++i) {
+      if (!frames.has(i)) continue;
+      std::visit(
+          [&](const auto& image) {
+            const auto in = image.row(y);
+            for (std::size_t x = 0; x < in.size(); ++x)
+              out[x] = static_cast<std::uint8_t>(out[x] + (in[x] >= saturation && out[x] < 255));
+          },
+          frames.frame(i));
+    }
+  });
+  return counts;
+}
+
 std::vector<Frames> read_all(FrameSource& source, Progress& progress) {
   std::vector<Frames> cameras;
   for (const Sequence& sequence : source.sequences()) cameras.emplace_back(sequence);

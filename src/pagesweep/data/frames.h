@@ -62,6 +62,9 @@ class Frames {
 /// in which a sweep shows the whole page lit (paper Fig. 4).
 Image<float> brightest(const Frames& frames);
 
+/// In how many frames each pixel is clipped (255: that many or more).
+Image<std::uint8_t> count_clipped(const Frames& frames);
+
 /// Simultaneous frames of all cameras; a camera whose frame was dropped has none.
 struct FrameSet {
   int index = 0;  ///< [frames] time of exposure

@@ -37,6 +37,12 @@ TEST(Frames, TheBrightestGrayValueCountsClippedOnesAsSaturation) {
   EXPECT_EQ(picture(1, 0), 248);
 }
 
+TEST(Frames, CountsTheFramesInWhichAPixelIsClipped) {
+  const auto counts = count_clipped(three_frames_with_the_middle_one_dropped());
+  EXPECT_EQ(counts(0, 0), 0);
+  EXPECT_EQ(counts(1, 0), 2);
+}
+
 TEST(Frames, RefuseAFrameThatDoesNotFit) {
   Frames frames({.camera = "cam1", .width = 2, .height = 1, .count = 1});
   EXPECT_THROW(frames.set(0, Image<std::uint8_t>(3, 1)), std::invalid_argument);

@@ -115,6 +115,26 @@ std::vector<CameraData> read_cameras(const fs::path& out, const Truth& truth, co
   return cameras;
 }
 
+/// The perpendicular errors of the page pixels that were clipped in some frame.
+std::optional<ErrorSummary> summarise_clipped(const fs::path& out, const std::vector<CameraData>& cameras,
+                                              const std::vector<Image<float>>& error_maps) {
+  std::vector<double> errors;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const Camera& camera = *cameras[c].camera;
+    const fs::path file = out / (camera.name + "_clipped.png");
+    if (!fs::exists(file)) return std::nullopt;
+    const GrayImage counts = read_gray(file, ImageSize{camera.width, camera.height});
+    std::visit(
+        [&](const auto& frames) {
+          for (std::size_t i = 0; i < frames.size(); ++i)
+            if (const float error = error_maps[c].data()[i]; frames.data()[i] > 0 && std::isfinite(error))
+              errors.push_back(error);
+        },
+        counts);
+  }
+  return summarise(std::move(errors));
+}
+
 void evaluate_points(const fs::path& out, const std::vector<CameraData>& cameras, const EvaluationOptions& options,
                      Evaluation& evaluation) {
   std::vector<MeasuredView> views;
@@ -125,6 +145,7 @@ void evaluate_points(const fs::path& out, const std::vector<CameraData>& cameras
     evaluation.points_reason = "the truth has the points of no camera of the rig";
   } else if (have_maps) {
     evaluation.points = compare_points(views, options.points);
+    evaluation.clipped_points = summarise_clipped(out, cameras, evaluation.points->error_maps);
   } else if (fs::exists(out / "points.ply")) {
     const PointCloud cloud = read_ply(out / "points.ply");
     evaluation.points_from_cloud = true;

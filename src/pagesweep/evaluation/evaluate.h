@@ -41,6 +41,7 @@ struct PageEvaluation {
 struct Evaluation {
   std::vector<std::string> cameras;  ///< those with a truth, in the rig's order
   std::optional<PointComparison> points;
+  std::optional<ErrorSummary> clipped_points;  ///< [mm] of pixels that were clipped in some frame; if the result says which
   bool points_from_cloud = false;  ///< from points.ply, without knowing the pixels; only points->all holds figures
   std::string points_reason;       ///< why there are none
   std::optional<TimeComparison> times;

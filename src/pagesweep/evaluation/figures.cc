@@ -67,6 +67,14 @@ void add_points(const Evaluation& evaluation, std::vector<Figure>& figures) {
     add_counts(errors, group);
   }
   if (!evaluation.points) return;
+  Group clipped(
+      figures, "points_clipped",
+      evaluation.clipped_points ? "no page pixel was clipped" : "the result does not tell which were clipped");
+  const ErrorSummary of_clipped = evaluation.clipped_points.value_or(ErrorSummary{});
+  clipped.add("count", "points of pixels that were clipped in some frame", static_cast<double>(of_clipped.count),
+              "points");
+  clipped.add("rms", "their distance to the true surface, rms", of_clipped.rms, "mm");
+  clipped.add("p95", "distance that 95 % of them keep", of_clipped.p95, "mm");
   for (std::size_t c = 0; c < evaluation.points->cameras.size(); ++c) {
     const PointErrors& own = evaluation.points->cameras[c];
     Group camera(figures, "points_" + evaluation.cameras[c], reason);

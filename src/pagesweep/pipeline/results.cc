@@ -21,8 +21,9 @@ struct MapFiles {
         sigma(folder / (camera + "_point_sigma.tiff")),
         intensity(folder / (camera + "_intensity.tiff")),
         status(folder / (camera + "_status.png")),
-        times(folder / (camera + "_times.tiff")) {}
-  fs::path points, sigma, intensity, status, times;
+        times(folder / (camera + "_times.tiff")),
+        clipped(folder / (camera + "_clipped.png")) {}
+  fs::path points, sigma, intensity, status, times, clipped;
 };
 
 ImageView<const std::uint8_t> bytes_of(const Image<PixelStatus>& status) {
@@ -103,9 +104,11 @@ void remove_old_pages(const fs::path& folder) {
 
 void write_measurement(const fs::path& folder, const Measurement& measurement) {
   write_ply(folder / "points.ply", measurement.points);
-  for (std::size_t c = 0; c < measurement.points.size(); ++c)
-    write_maps(MapFiles(folder, measurement.cameras[c].name), measurement.points[c],
-               measurement.timing ? &measurement.timing->maps[c] : nullptr);
+  for (std::size_t c = 0; c < measurement.points.size(); ++c) {
+    const MapFiles files(folder, measurement.cameras[c].name);
+    write_maps(files, measurement.points[c], measurement.timing ? &measurement.timing->maps[c] : nullptr);
+    if (!measurement.clipped_frames.empty()) write_gray_png(files.clipped, measurement.clipped_frames[c].view());
+  }
 }
 
 Measurement read_measurement(const fs::path& folder, const Rig& rig) {

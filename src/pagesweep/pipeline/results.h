@@ -26,7 +26,8 @@ struct PageFileOptions {
 };
 
 /// Writes what the cameras measured (docs/formats.md, "Results"): points.ply, and for each camera NAME its maps
-/// NAME_points.tiff, NAME_point_sigma.tiff, NAME_intensity.tiff, NAME_status.png and NAME_times.tiff.
+/// NAME_points.tiff, NAME_point_sigma.tiff, NAME_intensity.tiff, NAME_status.png, NAME_clipped.png (in how
+/// many frames a pixel is clipped) and NAME_times.tiff.
 /// \throws Error  if a file cannot be written
 void write_measurement(const std::filesystem::path& folder, const Measurement& measurement);
 

@@ -27,7 +27,8 @@ std::vector<Camera> cameras_of(const FrameSource& source, const Rig& rig, Matche
   }
   if (matcher == Matcher::light_section) {
     if (!rig.light)
-      throw Error(ErrorKind::bad_input, "light sectioning needs the rig's \"light\": calibrate it, or match two cameras");
+      throw Error(ErrorKind::bad_input,
+                  "light sectioning needs the rig's \"light\": calibrate it, or match two cameras");
   } else if (cameras.size() != 2) {
     throw Error(ErrorKind::bad_input,
                 fmt::format("matching needs two cameras and the capture has {}: use --matcher light-section for one",
@@ -68,7 +69,10 @@ Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& 
   Measurement measurement;
   measurement.cameras = cameras_of(source, rig, options.matcher);
   const std::vector<Frames> frames = read_all(source, progress);
-  for (const Frames& sequence : frames) measurement.dropped_frames.push_back(sequence.dropped());
+  for (const Frames& sequence : frames) {
+    measurement.dropped_frames.push_back(sequence.dropped());
+    measurement.clipped_frames.push_back(count_clipped(sequence));
+  }
 
   if (options.matcher != Matcher::sequence) measurement.timing = estimate_times(frames, options.timing, progress);
 
@@ -92,7 +96,8 @@ Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& 
 
 Scan flatten(Measurement measurement, const Picture& picture, const Rig& rig, const ScanOptions& options,
              Progress& progress) {
-  if (!rig.scanner) throw Error(ErrorKind::bad_input, "the rig has no \"scanner\": without it no picture can be flattened");
+  if (!rig.scanner)
+    throw Error(ErrorKind::bad_input, "the rig has no \"scanner\": without it no picture can be flattened");
   if (picture.width() != rig.scanner->width() || picture.height() != rig.scanner->height())
     throw Error(ErrorKind::bad_input,
                 fmt::format("the scan has {} x {} pixels but the rig's scanner {} x {}: they do not belong together",

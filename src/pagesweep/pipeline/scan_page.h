@@ -56,6 +56,7 @@ struct ScanOptions {
 struct Measurement {
   std::vector<Camera> cameras;
   std::vector<int> dropped_frames;
+  std::vector<Image<std::uint8_t>> clipped_frames;  ///< in how many frames each pixel was clipped; empty: not known
   std::optional<Timing> timing;  ///< time maps, stripe profile, sensor noise; none for the sequence matcher
   std::vector<PointMap> points;
 };
@@ -73,7 +74,8 @@ Measurement reconstruct(FrameSource& frames, const Rig& rig, const ScanOptions& 
                         Progress& progress = no_progress());
 
 /// The second half: points to flat pages.
-/// \throws Error  (bad_input) if the rig has no scanner or the picture is not of its size; (no_result) if no page is found
+/// \throws Error  (bad_input) if the rig has no scanner or the picture is not of its size; (no_result) if no page is
+/// found
 Scan flatten(Measurement measurement, const Picture& scan, const Rig& rig, const ScanOptions& options = {},
              Progress& progress = no_progress());
 
