@@ -8,11 +8,11 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "pagesweep/io/files_testing.h"
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/json_file.h"
 #include "pagesweep/io/ply_file.h"
-#include "pagesweep/io/test_files.h"
 
 namespace pagesweep {
 namespace {

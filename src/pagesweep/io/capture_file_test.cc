@@ -2,9 +2,9 @@
 #include "pagesweep/io/capture_file.h"
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/io/files_testing.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/rig_file.h"
-#include "pagesweep/io/test_files.h"
 
 namespace pagesweep {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/io/atomic_file.h"
-#include "pagesweep/io/tiff_reader.h"
+#include "pagesweep/io/tiff_reader_internal.h"
 
 namespace pagesweep {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "pagesweep/data/time_map.h"
+#include "pagesweep/io/files_testing.h"
 #include "pagesweep/io/image_file.h"
-#include "pagesweep/io/test_files.h"
 
 namespace pagesweep {
 namespace {

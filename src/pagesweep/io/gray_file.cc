@@ -6,8 +6,8 @@
 #include "pagesweep/base/error.h"
 #include "pagesweep/io/atomic_file.h"
 #include "pagesweep/io/image_file.h"
-#include "pagesweep/io/png_file.h"
-#include "pagesweep/io/tiff_reader.h"
+#include "pagesweep/io/png_file_internal.h"
+#include "pagesweep/io/tiff_reader_internal.h"
 
 namespace pagesweep {
 namespace {

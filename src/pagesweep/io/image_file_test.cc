@@ -6,7 +6,7 @@
 
 #include <vips/vips8>
 
-#include "pagesweep/io/test_files.h"
+#include "pagesweep/io/files_testing.h"
 
 namespace pagesweep {
 namespace {

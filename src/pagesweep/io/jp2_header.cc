@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pagesweep/io/jp2_header.h"
+#include "pagesweep/io/jp2_header_internal.h"
 
 #include <cmath>
 #include <cstdint>

@@ -3,11 +3,11 @@
 #include <random>
 
 #include "pagesweep/io/capture_file.h"
+#include "pagesweep/io/files_testing.h"
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/ply_file.h"
 #include "pagesweep/io/rig_file.h"
-#include "pagesweep/io/test_files.h"
 #include "pagesweep/io/truth_file.h"
 
 namespace pagesweep {

@@ -11,7 +11,7 @@
 #include "pagesweep/base/error.h"
 #include "pagesweep/io/atomic_file.h"
 #include "pagesweep/io/image_file.h"
-#include "pagesweep/io/jp2_header.h"
+#include "pagesweep/io/jp2_header_internal.h"
 
 namespace pagesweep {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "pagesweep/io/test_files.h"
+#include "pagesweep/io/files_testing.h"
 
 namespace pagesweep {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pagesweep/io/png_file.h"
+#include "pagesweep/io/png_file_internal.h"
 
 #include <fmt/format.h>
 #include <png.h>

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <limits>
 
-#include "pagesweep/io/test_files.h"
+#include "pagesweep/io/files_testing.h"
 
 namespace pagesweep {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pagesweep/io/tiff_reader.h"
+#include "pagesweep/io/tiff_reader_internal.h"
 
 #include <fmt/format.h>
 #include <tiffio.h>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/io/truth_file.h"
 
+#include "pagesweep/io/files_testing.h"
 #include "pagesweep/io/float_tiff.h"
-#include "pagesweep/io/test_files.h"
 
 namespace pagesweep {
 namespace {
