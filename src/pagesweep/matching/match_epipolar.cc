@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/matching/match_epipolar.h"
 
-#include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "pagesweep/matching/time_field.h"
 #include "pagesweep/matching/two_way.h"
@@ -77,28 +78,44 @@ std::optional<double> follow(const TimeDifference& difference, double expected, 
 }
 
 /// Finds equal times along epipolar curves.
-class TimeMatcher final : public Matcher {
+class TimeFinder final : public MatchFinder {
  public:
-  TimeMatcher(const TimeMap& from, const TimeField& to, const MatchOptions& options)
-      : from_(&from), to_(&to), max_sigma_px_(options.max_sigma_px) {}
+  TimeFinder(const TimeMap& from, const TimeField& to, double max_sigma_px)
+      : from_(from), to_(to), max_sigma_px_(max_sigma_px) {}
 
-  PixelStatus status_of(int x, int y) const override { return from_->status(x, y); }
-
-  Match find(int x, int y, const EpipolarCurve& curve, double expected, CurveSamples& samples) const override {
-    const TimeDifference difference{to_, &curve, from_->time(x, y)};
+  Match find(int x, int y, const EpipolarCurve& curve, double expected) override {
+    const TimeDifference difference{&to_, &curve, from_.time(x, y)};
     if (curve.contains(expected))
       if (const auto root = follow(difference, expected, 1 / curve.speed(expected)))
-        return match_at(*root, difference, from_->sigma(x, y));
-    return search(difference, expected, from_->sigma(x, y), samples);
+        return match_at(*root, difference, from_.sigma(x, y));
+    return search(difference, expected, from_.sigma(x, y));
   }
 
  private:
   /// Looks along the whole curve.
-  Match search(const TimeDifference& difference, double expected, float sigma, CurveSamples& samples) const;
+  Match search(const TimeDifference& difference, double expected, float sigma);
   Match match_at(double root, const TimeDifference& difference, float sigma) const;
 
-  const TimeMap* from_;
-  const TimeField* to_;
+  const TimeMap& from_;
+  const TimeField& to_;
+  double max_sigma_px_;
+  CurveSamples samples_;
+  std::vector<double> roots_;
+};
+
+class TimeMatcher final : public Matcher {
+ public:
+  TimeMatcher(const TimeMap& from, const TimeField& to, double max_sigma_px)
+      : from_(from), to_(to), max_sigma_px_(max_sigma_px) {}
+
+  PixelStatus status_of(int x, int y) const override { return from_.status(x, y); }
+  std::unique_ptr<MatchFinder> make_finder() const override {
+    return std::make_unique<TimeFinder>(from_, to_, max_sigma_px_);
+  }
+
+ private:
+  const TimeMap& from_;
+  const TimeField& to_;
   double max_sigma_px_;
 };
 
@@ -120,31 +137,31 @@ std::optional<double> choose(const std::vector<double>& roots, double expected, 
   return clear ? std::optional(nearest) : std::nullopt;
 }
 
-Match TimeMatcher::search(const TimeDifference& difference, double expected, float sigma, CurveSamples& samples) const {
-  sample(*difference.curve, samples);
-  std::vector<double> roots;
+Match TimeFinder::search(const TimeDifference& difference, double expected, float sigma) {
+  sample(*difference.curve, samples_);
+  roots_.clear();
   bool seen = false;
   double before = nan;
-  for (int i = 0; i < samples.size(); ++i) {
+  for (int i = 0; i < samples_.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const Eigen::Vector2d pixel(samples.u[k], samples.v[k]);
-    const double value = std::isnan(pixel.x()) ? nan : to_->time_at(pixel) - difference.time;
+    const Eigen::Vector2d pixel(samples_.u[k], samples_.v[k]);
+    const double value = std::isnan(pixel.x()) ? nan : to_.time_at(pixel) - difference.time;
     seen = seen || !std::isnan(pixel.x());
     if (before * value <= 0) {
-      const double low = samples.inverse_depth[k - 1], high = samples.inverse_depth[k];
+      const double low = samples_.inverse_depth[k - 1], high = samples_.inverse_depth[k];
       const auto root = solve(difference, {low, high, before, value}, high - low);
-      const bool known = root && !roots.empty() && *root - roots.back() < high - low;
-      if (root && !known) roots.push_back(*root);
+      const bool known = root && !roots_.empty() && *root - roots_.back() < high - low;
+      if (root && !known) roots_.push_back(*root);
     }
     before = value;
   }
   if (!seen) return Match::none(PixelStatus::outside_view);
-  if (roots.empty()) return Match::none(PixelStatus::no_match);
-  const auto root = choose(roots, expected, 1 / difference.curve->speed(roots[0]));
+  if (roots_.empty()) return Match::none(PixelStatus::no_match);
+  const auto root = choose(roots_, expected, 1 / difference.curve->speed(roots_[0]));
   return root ? match_at(*root, difference, sigma) : Match::none(PixelStatus::ambiguous);
 }
 
-Match TimeMatcher::match_at(double root, const TimeDifference& difference, float sigma) const {
+Match TimeFinder::match_at(double root, const TimeDifference& difference, float sigma) const {
   const EpipolarCurve& curve = *difference.curve;
   const auto pixel = curve.at(root);
   if (!pixel) return Match::none(PixelStatus::outside_view);
@@ -154,7 +171,7 @@ Match TimeMatcher::match_at(double root, const TimeDifference& difference, float
   double slope = 0.5 * (behind - before);
   if (std::isnan(slope)) slope = std::isnan(behind) ? here - before : behind - here;
   if (!std::isfinite(slope)) return Match::none(PixelStatus::no_match);
-  const double variance = static_cast<double>(sigma) * sigma + to_->variance_at(*pixel);
+  const double variance = static_cast<double>(sigma) * sigma + to_.variance_at(*pixel);
   const double sigma_px = std::sqrt(variance) / std::abs(slope);
   if (!(sigma_px <= max_sigma_px_)) return Match::none(PixelStatus::ambiguous);
   return {PixelStatus::ok, *pixel, sigma_px, root};
@@ -172,7 +189,8 @@ MatchPair match_times(const TimeMap& first, const TimeMap& second, const Camera&
   require_size(first, first_camera);
   require_size(second, second_camera);
   const TimeField first_field(first), second_field(second);
-  const TimeMatcher from_first(first, second_field, options), from_second(second, first_field, options);
+  const TimeMatcher from_first(first, second_field, options.max_sigma_px),
+      from_second(second, first_field, options.max_sigma_px);
   return match_both_ways(first_camera, second_camera, from_first, from_second, options, progress);
 }
 

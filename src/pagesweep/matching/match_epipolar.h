@@ -4,6 +4,7 @@
 #include <array>
 #include <string_view>
 
+#include "pagesweep/base/enum_names.h"
 #include "pagesweep/base/progress.h"
 #include "pagesweep/camera/camera.h"
 #include "pagesweep/data/correspondences.h"

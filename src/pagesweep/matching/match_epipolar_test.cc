@@ -68,7 +68,7 @@ struct Case {
 
 class MatchTimes : public testing::TestWithParam<Case> {
  protected:
-  static constexpr int width_px = 320;
+  static constexpr int width_px = 200;
   const AnalyticScene& scene = *GetParam().scene;
   const Rig rig = sim::make_test_rig(width_px);
   const Camera& cam1 = rig.cameras[0];
@@ -103,6 +103,111 @@ INSTANTIATE_TEST_SUITE_P(Surfaces, MatchTimes,
                          testing::Values(Case{"flat", &flat}, Case{"tilted", &tilted}, Case{"cylinder", &cylinder},
                                          Case{"gutter", &gutter}),
                          [](const auto& test) { return test.param.name; });
+
+TEST(MatchTimesOnAStep, GivesNoMatchThatIsNotThere) {
+  const Rig rig = sim::make_test_rig(200);
+  const Camera &cam1 = rig.cameras[0], &cam2 = rig.cameras[1];
+  auto times1 = step.times(cam1, *rig.light, 0.02), times2 = step.times(cam2, *rig.light, 0.02);
+  add_noise(times1, 3);
+  add_noise(times2, 4);
+  const MatchPair pair = match_times(times1, times2, cam1, cam2);
+  const Correspondences truth = step.correspondences(cam1, cam2);
+  int wrong = 0, matched = 0, should = 0;
+  for (int y = 0; y < truth.height(); ++y)
+    for (int x = 0; x < truth.width(); ++x) {
+      if (truth.status(x, y) == PixelStatus::ok) ++should;
+      if (pair.from_first.status(x, y) != PixelStatus::ok) continue;
+      ++matched;
+      const double error = std::hypot(pair.from_first.u(x, y) - truth.u(x, y), pair.from_first.v(x, y) - truth.v(x, y));
+      if (!(error < 6 * pair.from_first.sigma(x, y))) ++wrong;
+    }
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GT(matched, 0.95 * should);  // `should` also counts what the upper plate hides from the other camera
+}
+
+class MatchTimesOfAFlatPage : public testing::Test {
+ protected:
+  const Rig rig = sim::make_test_rig(120);
+  const Camera& cam1 = rig.cameras[0];
+  const Camera& cam2 = rig.cameras[1];
+  TimeMap times1 = flat.times(cam1, *rig.light);
+  TimeMap times2 = flat.times(cam2, *rig.light);
+};
+
+TEST_F(MatchTimesOfAFlatPage, KeepsTheReasonOfAPixelWithoutTime) {
+  times1.status(60, 60) = PixelStatus::saturated;
+  times1.time(60, 60) = not_a_number;
+  const MatchPair pair = match_times(times1, times2, cam1, cam2);
+  EXPECT_EQ(pair.from_first.status(60, 60), PixelStatus::saturated);
+  EXPECT_TRUE(std::isnan(pair.from_first.u(60, 60)));
+  EXPECT_EQ(pair.from_first.status(59, 60), PixelStatus::ok);  // it needs only the other camera's pixels
+}
+
+TEST_F(MatchTimesOfAFlatPage, FindsNothingWhereTheOtherCameraHasNoTimes) {
+  const Correspondences truth = flat.correspondences(cam1, cam2);
+  const int u = static_cast<int>(truth.u(60, 60)), v = static_cast<int>(truth.v(60, 60));
+  for (int y = v - 3; y <= v + 4; ++y)
+    for (int x = u - 3; x <= u + 4; ++x) {
+      times2.status(x, y) = PixelStatus::too_dark;
+      times2.time(x, y) = not_a_number;
+    }
+  const MatchPair pair = match_times(times1, times2, cam1, cam2);
+  EXPECT_EQ(pair.from_first.status(60, 60), PixelStatus::no_match);
+}
+
+TEST_F(MatchTimesOfAFlatPage, TwoEqualPlacesAreAmbiguous) {
+  // The stripe passes the other camera's picture there and back: every time twice.
+  for (int y = 0; y < 120; ++y)
+    for (int x = 0; x < 120; ++x) {
+      times2.time(x, y) = static_cast<float>(std::abs(y - 60));
+      times2.status(x, y) = PixelStatus::ok;
+      times2.sigma(x, y) = 0.02f;
+      times1.time(x, y) = 20;
+      times1.status(x, y) = PixelStatus::ok;
+      times1.sigma(x, y) = 0.02f;
+    }
+  MatchOptions options;
+  options.near_mm = 400;
+  options.far_mm = 1500;
+  const MatchPair pair = match_times(times1, times2, cam1, cam2, options);
+  int ambiguous = 0;
+  for (const PixelStatus status : pair.from_first.status.pixels()) {
+    EXPECT_NE(status, PixelStatus::ok);
+    ambiguous += status == PixelStatus::ambiguous ? 1 : 0;
+  }
+  EXPECT_GT(ambiguous, 2000);  // elsewhere the curve shows only one of the places
+}
+
+TEST_F(MatchTimesOfAFlatPage, KeepsWithinTheGivenDepths) {
+  MatchOptions options;
+  options.near_mm = 100;
+  options.far_mm = 500;  // the page lies at 620 mm
+  const MatchPair pair = match_times(times1, times2, cam1, cam2, options);
+  for (const PixelStatus status : pair.from_first.status.pixels()) EXPECT_NE(status, PixelStatus::ok);
+}
+
+TEST_F(MatchTimesOfAFlatPage, DoesNotDependOnTheNumberOfThreads) {
+  add_noise(times1, 5);
+  add_noise(times2, 6);
+  const MatchPair many = match_times(times1, times2, cam1, cam2);
+  const ThreadLimit one(1);
+  const MatchPair single = match_times(times1, times2, cam1, cam2);
+  for (std::size_t i = 0; i < many.from_first.u.size(); ++i) {
+    ASSERT_EQ(many.from_first.status.data()[i], single.from_first.status.data()[i]);
+    if (many.from_first.status.data()[i] != PixelStatus::ok) continue;
+    ASSERT_EQ(many.from_first.u.data()[i], single.from_first.u.data()[i]);
+    ASSERT_EQ(many.from_first.sigma.data()[i], single.from_first.sigma.data()[i]);
+  }
+}
+
+TEST_F(MatchTimesOfAFlatPage, RefusesWhatContradictsItself) {
+  MatchOptions options;
+  options.near_mm = 800;
+  options.far_mm = 700;
+  EXPECT_THROW(match_times(times1, times2, cam1, cam2, options), std::invalid_argument);
+  EXPECT_THROW(match_times(TimeMap(3, 3), times2, cam1, cam2), std::invalid_argument);
+  EXPECT_THROW(match_times(times1, times1, cam1, cam1), std::invalid_argument);
+}
 
 }  // namespace
 }  // namespace pagesweep

@@ -59,25 +59,31 @@ double best_share(const SequenceProducts& p, int i, bool affine) {
   return a + b > 0 ? b / (a + b) : (g1 > g0 ? 1 : 0);
 }
 
-CurvePlace make_place(int segment, double share, const Interpolated& s, const Comparison& comparison) {
-  return {segment, share, std::max(0.0, comparison.distance_squared), comparison.gain, s.value, s.derivative};
+bool is_usable(const SequenceProducts& p, int i) {
+  return i >= 0 && i < crossings && p.usable[static_cast<std::size_t>(i)];
+}
+
+CurvePlace make_place(const SequenceProducts& p, int segment, double share, const Interpolated& s,
+                      const Comparison& comparison) {
+  const bool at_end = (share <= 0 && !is_usable(p, segment - 1)) || (share >= 1 && !is_usable(p, segment + 2));
+  return {segment,         share, at_end,  std::max(0.0, comparison.distance_squared),
+          comparison.gain, 0,     s.value, s.derivative};
 }
 
 CurvePlace nearest_on_polyline(const SequenceProducts& p, bool affine) {
   CurvePlace nearest;
-  for (int i = 0; i + 1 < crossings; ++i) {
-    if (!p.usable[static_cast<std::size_t>(i)] || !p.usable[static_cast<std::size_t>(i) + 1]) continue;
+  for (int i = 1; i + 2 < crossings; ++i) {
+    if (!is_usable(p, i) || !is_usable(p, i + 1)) continue;
     const double share = std::clamp(best_share(p, i, affine), 0.0, 1.0);
     const Interpolated interpolated = linear_at(i, share);
     const Comparison here = compare(p, interpolated, affine);
-    if (here.distance_squared < nearest.distance_squared) nearest = make_place(i, share, interpolated, here);
+    if (here.distance_squared < nearest.distance_squared) nearest = make_place(p, i, share, interpolated, here);
   }
   return nearest;
 }
 
 bool has_four(const SequenceProducts& p, int segment) {
-  return segment >= 1 && segment + 2 < crossings && p.usable[static_cast<std::size_t>(segment) - 1] &&
-         p.usable[static_cast<std::size_t>(segment) + 2];
+  return is_usable(p, segment - 1) && is_usable(p, segment) && is_usable(p, segment + 1) && is_usable(p, segment + 2);
 }
 
 /// Moves on along the spline, from one segment to the next if need be.
@@ -106,16 +112,18 @@ CurvePlace polish(const SequenceProducts& p, int segment, double share, bool aff
     here = there;
     if (arrived) break;
   }
-  return make_place(segment, share, interpolated, here);
+  return make_place(p, segment, share, interpolated, here);
 }
 
 }  // namespace
 
 CurvePlace nearest_place(const SequenceProducts& products, Normalisation normalisation, Interpolation interpolation) {
   const bool affine = normalisation == Normalisation::affine;
-  const CurvePlace place = nearest_on_polyline(products, affine);
-  const bool cubic = interpolation == Interpolation::cubic && place.segment >= 0 && has_four(products, place.segment);
-  return cubic ? polish(products, place.segment, place.share, affine) : place;
+  CurvePlace linear = nearest_on_polyline(products, affine);
+  if (linear.segment < 0 || !has_four(products, linear.segment)) return linear;
+  CurvePlace cubic = polish(products, linear.segment, linear.share, affine);
+  linear.doubt = cubic.doubt = std::abs(cubic.segment + cubic.share - linear.segment - linear.share);
+  return interpolation == Interpolation::cubic ? cubic : linear;
 }
 
 }  // namespace pagesweep

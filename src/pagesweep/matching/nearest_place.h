@@ -22,15 +22,17 @@ struct SequenceProducts {
 
 /// A place between two crossings.
 struct CurvePlace {
-  int segment = -1;  ///< it lies between crossings segment and segment + 1; -1: there is none
-  double share = 0;  ///< of the way from the one to the other
+  int segment = -1;     ///< it lies between crossings segment and segment + 1; -1: there is none
+  double share = 0;     ///< of the way from the one to the other
+  bool at_end = false;  ///< nothing is known beyond, where an even nearer place may be
   double distance_squared = std::numeric_limits<double>::infinity();  ///< of the sequences, eq. 1
   double gain = 1;                                                    ///< by which the interpolated sequence is scaled
+  double doubt = 0;  ///< [crossings] that the interpolation leaves: as much as linear and cubic differ
   /// The interpolated sequence is the sum of value_i S_i; its change a crossing that of derivative_i S_i.
   Eigen::Matrix<double, SequenceProducts::crossings, 1> value, derivative;
 };
 
-/// Where the interpolated sequence comes nearest to g (eq. 2).
+/// Where the interpolated sequence comes nearest to g (eq. 2), on the three segments in the middle.
 ///
 /// Interpolated linearly, the sequences are a polyline in as many dimensions as there are frames, and the nearest point
 /// of each segment has a closed form: with normalisation none, the foot of g on the segment; with affine, where the

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "pagesweep/base/parallel.h"
@@ -26,13 +27,13 @@ struct Direction {
   EpipolarGeometry geometry(InverseDepthRange range) const { return {*from, *from_rays, *to, *to_rays, range}; }
 };
 
-Match find(const Direction& direction, const EpipolarGeometry& geometry, int x, int y, double expected,
-           CurveSamples& samples) {
+Match find(const Direction& direction, const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y,
+           double expected) {
   const PixelStatus status = direction.matcher->status_of(x, y);
   if (status != PixelStatus::ok) return Match::none(status);
   const EpipolarCurve curve = geometry.curve(x, y);
   if (curve.range().empty()) return Match::none(PixelStatus::outside_view);
-  return direction.matcher->find(x, y, curve, expected, samples);
+  return finder.find(x, y, curve, expected);
 }
 
 /// What the options allow: from a tenth of the cameras' distance to infinity where they say nothing.
@@ -51,14 +52,14 @@ std::vector<double> probe_depths(const Direction& there, const Direction& back, 
   const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / 20000.0)));
   std::vector<std::vector<double>> rows(static_cast<std::size_t>((height + stride - 1) / stride));
   parallel_rows(static_cast<int>(rows.size()), [&](int row) {
-    CurveSamples samples;
+    const auto finder = there.matcher->make_finder(), return_finder = back.matcher->make_finder();
     for (int x = stride / 2; x < width; x += stride) {
       const int y = std::min(row * stride + stride / 2, height - 1);
-      const Match match = find(there, geometry, x, y, nan, samples);
+      const Match match = find(there, geometry, *finder, x, y, nan);
       if (match.status != PixelStatus::ok) continue;
       const int u = std::clamp(static_cast<int>(std::lround(match.pixel.x())), 0, there.to->width - 1);
       const int v = std::clamp(static_cast<int>(std::lround(match.pixel.y())), 0, there.to->height - 1);
-      const Match returned = find(back, return_geometry, u, v, nan, samples);
+      const Match returned = find(back, return_geometry, *return_finder, u, v, nan);
       const bool agrees = returned.status == PixelStatus::ok && (returned.pixel - Eigen::Vector2d(x, y)).norm() < 3;
       if (agrees) rows[static_cast<std::size_t>(row)].push_back(match.inverse_depth);
     }
@@ -88,10 +89,10 @@ Correspondences match_one_way(const Direction& direction, InverseDepthRange rang
   for (int top = 0; top < matches.height(); top += band) {
     parallel_rows(std::min(band, matches.height() - top), [&](int row) {
       const int y = top + row;
-      CurveSamples samples;
+      const auto finder = direction.matcher->make_finder();
       double expected = nan;
       for (int x = 0; x < matches.width(); ++x) {
-        const Match match = find(direction, geometry, x, y, expected, samples);
+        const Match match = find(direction, geometry, *finder, x, y, expected);
         matches.status(x, y) = match.status;
         if (match.status != PixelStatus::ok) continue;
         matches.u(x, y) = static_cast<float>(match.pixel.x());

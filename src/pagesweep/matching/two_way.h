@@ -2,7 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <limits>
+#include <memory>
 
 #include "pagesweep/matching/epipolar_curve.h"
 #include "pagesweep/matching/match_epipolar.h"
@@ -19,15 +19,21 @@ struct Match {
   static Match none(PixelStatus why) { return {why, {}, 0, 0}; }
 };
 
-/// Finds matches of one camera's pixels in the other: what the two matchers differ in.
+/// Finds matches one after the other, from left to right in a row. It holds scratch memory: one a thread.
+class MatchFinder {
+ public:
+  virtual ~MatchFinder() = default;
+  /// \param expected  inverse depth of the last match to the left; NaN if there is none
+  virtual Match find(int x, int y, const EpipolarCurve& curve, double expected) = 0;
+};
+
+/// One camera's pixels as they can be matched with the other's: what the two matchers differ in.
 class Matcher {
  public:
   virtual ~Matcher() = default;
   /// Why the pixel cannot be matched at all; ok if it can.
   virtual PixelStatus status_of(int x, int y) const = 0;
-  /// \param expected  inverse depth of the pixel's left neighbour; NaN if it has none
-  /// \param samples   scratch memory
-  virtual Match find(int x, int y, const EpipolarCurve& curve, double expected, CurveSamples& samples) const = 0;
+  virtual std::unique_ptr<MatchFinder> make_finder() const = 0;
 };
 
 /// Matches all pixels both ways, finding the depth ranges first where they are not given, and keeps what agrees.
