@@ -11,7 +11,45 @@
 namespace pagesweep::sim {
 namespace {
 
-/// Adds weight * the stripe's light at each frame to `frames`.
+class Gathering {
+ public:
+  Gathering(const World& world, const RayCaster& caster, const DirectLight& direct, const Stripe& stripe,
+            const BounceOptions& options)
+      : world_(world), caster_(caster), direct_(direct), stripe_(stripe), directions_(cosine_directions(options.rays)) {
+    for (const Surface& surface : world.surfaces) levels_.push_back(surface.albedo.level_for(options.spacing_mm));
+  }
+
+  /// Adds the light that all directions send to a place, each with the same share.
+  void gather(const Outpost& outpost, std::span<float> irradiance) const {
+    const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), outpost.normal);
+    std::vector<SimRay> rays;
+    for (const Eigen::Vector3d& direction : directions_)
+      rays.push_back({outpost.point.cast<float>(), (turn * direction).cast<float>()});
+    std::vector<SimHit> hits(rays.size());
+    caster_.cast(rays, hits);
+    for (const SimHit& hit : hits) {
+      if (hit.surface < 0) continue;
+      const auto number = static_cast<std::size_t>(hit.surface);
+      const Surface& source = world_.surfaces[number];
+      const NodeLight light = light_at(direct_[number], hit.spot);
+      const Eigen::Vector2f st = source.mesh.parameters(hit.spot);
+      const float albedo = source.albedo.at(st.x(), st.y(), levels_[number]);
+      if (light.diffuse > 0)
+        add_stripe(stripe_, light, albedo * light.diffuse / static_cast<float>(directions_.size()), irradiance);
+    }
+  }
+
+ private:
+  const World& world_;
+  const RayCaster& caster_;
+  const DirectLight& direct_;
+  const Stripe& stripe_;
+  std::vector<Eigen::Vector3d> directions_;
+  std::vector<int> levels_;  ///< of each surface's texture
+};
+
+}  // namespace
+
 void add_stripe(const Stripe& stripe, const NodeLight& light, float weight, std::span<float> frames) {
   const float reach = static_cast<float>(stripe.last_mm()) / light.speed;
   const int first = std::max(0, static_cast<int>(std::ceil(light.time - reach)));
@@ -19,8 +57,6 @@ void add_stripe(const Stripe& stripe, const NodeLight& light, float weight, std:
   for (int i = first; i <= last; ++i)
     frames[std::size_t(i)] += weight * stripe.light((static_cast<float>(i) - light.time) * light.speed);
 }
-
-}  // namespace
 
 std::vector<Eigen::Vector3d> cosine_directions(int count) {
   std::vector<Eigen::Vector3d> directions;
@@ -35,24 +71,7 @@ std::vector<Eigen::Vector3d> cosine_directions(int count) {
 Bounce::Bounce(const World& world, const RayCaster& caster, const DirectLight& direct, const Stripe& stripe, int frames,
                const BounceOptions& options)
     : frames_(frames) {
-  const std::vector<Eigen::Vector3d> directions = cosine_directions(options.rays);
-  const auto gather = [&](const Outpost& outpost, std::span<float> irradiance) {
-    const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), outpost.normal);
-    std::vector<SimRay> rays;
-    for (const Eigen::Vector3d& direction : directions)
-      rays.push_back({outpost.point.cast<float>(), (turn * direction).cast<float>()});
-    std::vector<SimHit> hits(rays.size());
-    caster.cast(rays, hits);
-    for (const SimHit& hit : hits) {
-      if (hit.surface < 0) continue;
-      const Surface& source = world.surfaces[std::size_t(hit.surface)];
-      const NodeLight light = light_at(direct[std::size_t(hit.surface)], hit.spot);
-      const Eigen::Vector2f st = source.mesh.parameters(hit.spot);
-      const float albedo = source.albedo.at(st.x(), st.y(), source.albedo.level_for(options.spacing_mm));
-      if (light.diffuse > 0)
-        add_stripe(stripe, light, albedo * light.diffuse / static_cast<float>(options.rays), irradiance);
-    }
-  };
+  const Gathering gathering(world, caster, direct, stripe, options);
   for (const Surface& surface : world.surfaces) {
     const double spacing = (surface.is_measured ? 1 : 6) * options.spacing_mm;
     const std::vector<double> s = even_lines(surface.mesh.s.back(), spacing);
@@ -65,9 +84,9 @@ Bounce::Bounce(const World& world, const RayCaster& caster, const DirectLight& d
     receivers.irradiance.resize(s.size() * t.size() * std::size_t(frames));
     parallel_rows(receivers.rows, [&](int j) {
       for (std::size_t i = 0; i < s.size(); ++i) {
-        const std::size_t place = std::size_t(j) * s.size() + i;
-        gather(outpost_at(surface.mesh, s[i], t[std::size_t(j)]),
-               std::span(receivers.irradiance).subspan(place * std::size_t(frames), std::size_t(frames)));
+        const std::size_t place = (std::size_t(j) * s.size() + i) * std::size_t(frames);
+        gathering.gather(outpost_at(surface.mesh, s[i], t[std::size_t(j)]),
+                         std::span(receivers.irradiance).subspan(place, std::size_t(frames)));
       }
     });
   }

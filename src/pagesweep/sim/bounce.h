@@ -44,6 +44,9 @@ class Bounce {
   std::vector<Receivers> receivers_;
 };
 
+/// Adds weight * the stripe's light at each frame to `frames`, as it passes a spot.
+void add_stripe(const Stripe& stripe, const NodeLight& light, float weight, std::span<float> frames);
+
 /// `count` directions about +z, evenly distributed with density cosine / pi: a Fibonacci spiral lifted to the
 /// hemisphere.
 std::vector<Eigen::Vector3d> cosine_directions(int count);

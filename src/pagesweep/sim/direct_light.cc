@@ -45,6 +45,39 @@ double lobe(const Gloss& gloss, double cos_half) {
   return gloss.strength * (gloss.exponent + 8) / 8 * std::pow(std::max(0.0, cos_half), gloss.exponent);
 }
 
+struct NodeLighting {
+  const RayCaster& caster;
+  const Lamp& lamp;
+  std::span<const Eigen::Vector3d> viewers;
+  int samples;
+  double unit;  ///< irradiance that counts as 1
+
+  NodeLight light_node(const Surface& surface, int i, int j) const {
+    const GridMesh& mesh = surface.mesh;
+    const Outpost outpost = outpost_at(mesh, mesh.s[std::size_t(i)], mesh.t[std::size_t(j)]);
+    const Eigen::Vector3d middle = lamp.middle_at(lamp.time_of(outpost.point));
+    double diffuse = 0, gloss[most_viewers] = {};
+    for (int k = 0; k < samples; ++k) {
+      const Emitter emitter = emitter_at(lamp, middle, k, samples, outpost.point);
+      const double cosine = emitter.direction.dot(outpost.normal);
+      if (cosine <= 0 || caster.blocked(outpost.point.cast<float>(), emitter.position.cast<float>())) continue;
+      const double share = emitter.intensity * cosine / unit;
+      diffuse += share;
+      if (surface.gloss.strength == 0) continue;
+      for (std::size_t v = 0; v < viewers.size(); ++v) {
+        const Eigen::Vector3d half = (emitter.direction + (viewers[v] - outpost.point).normalized()).normalized();
+        gloss[v] += share * lobe(surface.gloss, half.dot(outpost.normal));
+      }
+    }
+    NodeLight light;
+    light.time = static_cast<float>(lamp.time_of(mesh.positions(i, j)));
+    light.speed = static_cast<float>(lamp.speed_at(mesh.positions(i, j)));
+    light.diffuse = static_cast<float>(diffuse);
+    for (int v = 0; v < most_viewers; ++v) light.gloss[v] = static_cast<float>(gloss[v]);
+    return light;
+  }
+};
+
 }  // namespace
 
 Outpost outpost_at(const GridMesh& mesh, double s_mm, double t_mm) {
@@ -77,37 +110,14 @@ NodeLight light_at(const std::vector<NodeLight>& nodes, const MeshSpot& spot) {
 
 DirectLight light_surfaces(const World& world, const RayCaster& caster, const Lamp& lamp,
                            std::span<const Eigen::Vector3d> viewers, int samples) {
-  const double unit = level_irradiance(lamp, Eigen::Vector3d::Zero());
-  const auto light_node = [&](const Surface& surface, int i, int j) {
-    const GridMesh& mesh = surface.mesh;
-    const Outpost outpost = outpost_at(mesh, mesh.s[std::size_t(i)], mesh.t[std::size_t(j)]);
-    const double time = lamp.time_of(mesh.positions(i, j));
-    const Eigen::Vector3d middle = lamp.middle_at(lamp.time_of(outpost.point));
-    NodeLight light{.time = float(time), .speed = float(lamp.speed_at(mesh.positions(i, j)))};
-    double diffuse = 0, gloss[most_viewers] = {};
-    for (int k = 0; k < samples; ++k) {
-      const Emitter emitter = emitter_at(lamp, middle, k, samples, outpost.point);
-      const double cosine = emitter.direction.dot(outpost.normal);
-      if (cosine <= 0 || caster.blocked(outpost.point.cast<float>(), emitter.position.cast<float>())) continue;
-      const double share = emitter.intensity * cosine / unit;
-      diffuse += share;
-      if (surface.gloss.strength == 0) continue;
-      for (std::size_t v = 0; v < viewers.size(); ++v) {
-        const Eigen::Vector3d half = (emitter.direction + (viewers[v] - outpost.point).normalized()).normalized();
-        gloss[v] += share * lobe(surface.gloss, half.dot(outpost.normal));
-      }
-    }
-    light.diffuse = static_cast<float>(diffuse);
-    for (int v = 0; v < most_viewers; ++v) light.gloss[v] = static_cast<float>(gloss[v]);
-    return light;
-  };
+  const NodeLighting lighting{caster, lamp, viewers, samples, level_irradiance(lamp, Eigen::Vector3d::Zero())};
   DirectLight lights;
   for (const Surface& surface : world.surfaces) {
     std::vector<NodeLight>& nodes = lights.emplace_back(surface.mesh.nodes());
     parallel_rows(surface.mesh.rows(), [&](int j) {
       const int columns = surface.mesh.columns();
       for (int i = 0; i < columns; ++i)
-        nodes[std::size_t(j) * std::size_t(columns) + std::size_t(i)] = light_node(surface, i, j);
+        nodes[std::size_t(j) * std::size_t(columns) + std::size_t(i)] = lighting.light_node(surface, i, j);
     });
   }
   return lights;

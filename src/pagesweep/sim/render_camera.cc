@@ -94,10 +94,10 @@ class CameraRenderer {
       NodeLight light = light_at(lit_.direct[number], hit.spot);
       const Eigen::Vector2f st = lit_.world.surfaces[number].mesh.parameters(hit.spot);
       const float gloss = light.gloss[viewer_];
-      if (gloss > 0) sweep(light, share_of_ray * gloss, frames);
+      if (gloss > 0) add_stripe(lit_.stripe, light, share_of_ray * gloss, frames);
       const Print print = look_up(number, st, samples_[k], slopes);
       light.time += print.later;
-      sweep(light, share_of_ray * print.albedo * light.diffuse, frames);
+      add_stripe(lit_.stripe, light, share_of_ray * print.albedo * light.diffuse, frames);
       collect(hit.surface, print.albedo, st, shares);
     }
     for (const SurfaceShare& share : shares) {
@@ -164,16 +164,6 @@ class CameraRenderer {
       later += here * slopes.time_by_px.dot(tap);
     }
     return {albedo / static_cast<float>(sample.taps_px.size()), albedo > 0 ? later / albedo : 0};
-  }
-
-  /// The stripe passes a spot.
-  void sweep(const NodeLight& light, float weight, std::span<float> frames) const {
-    if (weight <= 0) return;
-    const float reach = static_cast<float>(lit_.stripe.last_mm()) / light.speed;
-    const int first = std::max(0, static_cast<int>(std::ceil(light.time - reach)));
-    const int last = std::min(static_cast<int>(frames.size()) - 1, static_cast<int>(std::floor(light.time + reach)));
-    for (int i = first; i <= last; ++i)
-      frames[std::size_t(i)] += weight * lit_.stripe.light((static_cast<float>(i) - light.time) * light.speed);
   }
 
   static void collect(int surface, float albedo, const Eigen::Vector2f& st, std::span<SurfaceShare> shares) {

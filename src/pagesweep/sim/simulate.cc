@@ -69,6 +69,22 @@ Image<Eigen::Vector3f> find_page_points(const GridMesh& mesh, const SimulatedPag
   return points;
 }
 
+/// Where every spot of the pages went.
+void note_page_truth(Stage& stage, const RayCaster& caster, Simulation& result, Progress& progress) {
+  progress.begin("noting the truth");
+  const Scene& scene = result.scene;
+  result.pages = std::move(stage.pages);
+  for (std::size_t k = 0; k < result.pages.size(); ++k) {
+    SimulatedPage& page = result.pages[k];
+    const int surface = stage.page_surfaces[k];
+    const GridMesh& mesh = stage.world.surfaces[std::size_t(surface)].mesh;
+    page.points = find_page_points(mesh, page, scene.quality.points_subsampling);
+    if (scene.rig.scanner)
+      page.scan_map = find_scan_map(stage.world, caster, surface, *scene.rig.scanner, page.albedo.width(),
+                                    page.albedo.height(), page.pixels_per_mm);
+  }
+}
+
 void require_sound(const Scene& scene) {
   if (scene.rig.cameras.empty() || scene.rig.cameras.size() > most_viewers)
     throw std::invalid_argument("a scene has one or two cameras");
@@ -110,16 +126,7 @@ Simulation simulate(const Scene& full_scene, const SimulateOptions& options, Pro
     result.scan.pixels_per_mm = result.rig.scanner->project_jacobian(Eigen::Vector3d::Zero()).row(0).norm();
   }
 
-  progress.begin("noting the truth");
-  result.pages = std::move(stage.pages);
-  for (std::size_t k = 0; k < result.pages.size(); ++k) {
-    SimulatedPage& page = result.pages[k];
-    const int surface = stage.page_surfaces[k];
-    page.points = find_page_points(world.surfaces[std::size_t(surface)].mesh, page, scene.quality.points_subsampling);
-    if (scene.rig.scanner)
-      page.scan_map = find_scan_map(world, caster, surface, *scene.rig.scanner, page.albedo.width(),
-                                    page.albedo.height(), page.pixels_per_mm);
-  }
+  note_page_truth(stage, caster, result, progress);
   return result;
 }
 
