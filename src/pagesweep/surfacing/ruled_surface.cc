@@ -262,11 +262,17 @@ class RulingSearch {
           best = turned;
         }
       }
-    return refine(best, best_cost);
+    // Once more with the scatter that good rulings leave: it is what makes the cost sharp.
+    best = refine(best, best_cost);
+    Fit second = prepare(cells_, best, gutter_);
+    fit_quickly(second, search_stiffness, 0, 4);
+    scatter_mm_ = scatter_of(second);
+    return refine(best, cost(best, best.angle_rad));
   }
 
  private:
   static constexpr double search_stiffness = 1e-6;
+  static constexpr double preference = 0.5;    // turn [rad] and fan that cost as much as one in the log likelihood
   static constexpr double largest_fan = 0.35;  // change of the rulings' distance over half the page
 
   RulingFrame refine(RulingFrame best, double best_cost) const {
@@ -280,7 +286,7 @@ class RulingSearch {
             RulingFrame trial = best;
             (turn ? trial.angle_rad : trial.fan) += sign * step / (turn ? 1 : half_length_mm_);
             if (std::abs(trial.fan) * half_length_mm_ > largest_fan) continue;
-            if (const double c = cost(trial, preferred_angle); c < best_cost - 1e-3) {
+            if (const double c = cost(trial, preferred_angle); c < best_cost - 1e-4) {
               best_cost = c;
               best = trial;
               improved = true;
@@ -293,7 +299,8 @@ class RulingSearch {
   double cost(const RulingFrame& frame, double preferred_angle) const {
     Fit fit = prepare(cells_, frame, gutter_);
     const double mean = fit_quickly(fit, search_stiffness, scatter_mm_, 2);
-    const double turn = (frame.angle_rad - preferred_angle) / 0.1, fan = frame.fan * half_length_mm_ / 0.1;
+    const double turn = (frame.angle_rad - preferred_angle) / preference,
+                 fan = frame.fan * half_length_mm_ / preference;
     // Neighbouring cells err alike: count one in thirty.
     return mean * static_cast<double>(cells_.size()) / 30 + turn * turn + fan * fan;
   }
