@@ -18,7 +18,7 @@ using nlohmann::json;
 /// A rig or a scene has a few kilobytes; what is larger than this is something else.
 constexpr std::size_t most_bytes = std::size_t{64} << 20;
 constexpr double unit_length_tolerance = 1e-4;
-constexpr double rotation_tolerance = 1e-6;
+constexpr double rotation_tolerance = 1e-4;
 /// What double precision leaves of a product of rotations: such a matrix is kept to the last bit.
 constexpr double rounding = 1e-14;
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/sim/ray_caster.h"
+#include "pagesweep/base/parallel.h"
 
 #include <embree3/rtcore.h>
 
@@ -39,8 +40,8 @@ RTCRay make_ray(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
 }  // namespace
 
 struct RayCaster::Embree {
-  // One thread builds, so that the tree, and with it which of two triangles owns a common edge, is always the same.
-  RTCDevice device = rtcNewDevice("threads=1,set_affinity=0");
+  // Not "threads=1": while such a device lives, Embree holds all TBB work of the process to one thread.
+  RTCDevice device = rtcNewDevice("set_affinity=0");
   RTCScene scene = nullptr;
   Embree() {
     if (!device) throw std::runtime_error("Embree cannot run on this machine");
@@ -60,7 +61,11 @@ RayCaster::RayCaster(std::vector<const GridMesh*> surfaces)
     rtcAttachGeometryByID(embree_->scene, geometry, static_cast<unsigned>(k));
     rtcReleaseGeometry(geometry);
   }
-  rtcCommitScene(embree_->scene);
+  {
+    // One thread builds, so that the tree, and with it which of two triangles owns a common edge, is always the same.
+    const ThreadLimit one_thread(1);
+    rtcCommitScene(embree_->scene);
+  }
   if (rtcGetDeviceError(embree_->device) != RTC_ERROR_NONE)
     throw std::runtime_error("Embree could not build the scene");
 }
