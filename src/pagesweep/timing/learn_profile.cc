@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
+#include <numbers>
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
@@ -153,7 +155,7 @@ void cut(Pupil& pupil, double reach) {
 StripeProfile raised_cosine(double fwhm) {
   std::vector<StripeProfile::Point> points;
   for (double t = -2 * fwhm; t <= 2 * fwhm; t += fwhm / 50)
-    points.push_back({t, std::abs(t) < fwhm ? 0.5 + 0.5 * std::cos(3.14159265358979 * t / fwhm) : 0});
+    points.push_back({t, std::abs(t) < fwhm ? 0.5 + 0.5 * std::cos(std::numbers::pi * t / fwhm) : 0});
   return StripeProfile::fit(points, -1.5 * fwhm, 1.5 * fwhm, fwhm / 8);
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <tuple>
 
 namespace pagesweep {
 namespace {
@@ -35,7 +37,6 @@ void StripeSearch::accumulate(const Image<float>& samples, float ceiling) {
   if (sums_.width() != samples.width() || sums_.height() != samples.height() + 1)
     sums_ = Image<float>(samples.width(), samples.height() + 1);
   std::ranges::fill(sums_.row(0), 0.0F);
-  last_.assign(static_cast<std::size_t>(samples.width()), 0.0F);
   for (int i = 0; i < samples.height(); ++i) {
     // A dropped frame repeats the one before: good enough to find a bell, and no estimator reads it.
     int shown = i;

@@ -36,7 +36,7 @@ class StripeSearch {
   int distance_;       ///< [frames] from the box to those beside it
   Image<float> sums_;  ///< row i: sum of the frames before i
   std::vector<int> frame_;
-  std::vector<float> rise_, last_;
+  std::vector<float> rise_;
 };
 
 }  // namespace pagesweep

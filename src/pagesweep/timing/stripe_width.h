@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <utility>
+
 #include "pagesweep/base/image.h"
 #include "pagesweep/data/frames.h"
 #include "pagesweep/timing/sensor_noise.h"
