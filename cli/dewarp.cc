@@ -28,9 +28,10 @@ void run(const Arguments& arguments) {
   OutputFolder output(arguments.output, "report.json");
   const Capture capture = read_capture(arguments.input.capture);
   const Rig rig = arguments.input.rig_of(capture);
+  const std::filesystem::path picture_file = arguments.input.picture_of(capture);
   progress.begin("reading the points");
   Measurement measurement = read_measurement(arguments.result, rig);
-  const Picture picture = read_picture(arguments.input.picture_of(capture));
+  const Picture picture = read_picture(picture_file);
   const Scan scan = flatten(std::move(measurement), picture, rig, arguments.options, progress);
 
   progress.begin("writing the pages");
