@@ -6,6 +6,8 @@
 #include <limits>
 #include <memory>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/matching/sequence_fit.h"
@@ -81,6 +83,7 @@ class SequenceFinder final : public MatchFinder {
   SequenceFitter fitter_;
   CurveSamples samples_;
   std::vector<float> scores_;  ///< of the samples; infinity where one is no candidate, or clearly worse than another
+  std::vector<std::pair<float, std::size_t>> minima_;  ///< score and sample
   std::vector<Candidate> candidates_;
 };
 
@@ -100,18 +103,24 @@ void SequenceFinder::scan(int x, int y) {
   }
 }
 
-/// Fits around all minima of the scores that may come to be the best.
+/// Fits around the minima of the scores that may come to be the best, the most promising ones first.
 void SequenceFinder::fit_minima(int x, int y, const EpipolarCurve& curve) {
+  constexpr std::size_t most = 8;
+  minima_.clear();
   candidates_.clear();
-  if (scores_.empty()) return;
-  const auto slack = static_cast<float>(coarseness * from_.energy(x, y));
-  const float limit = *std::min_element(scores_.begin(), scores_.end()) + slack;
   const auto score = [&](std::size_t i) { return i < scores_.size() ? scores_[i] : infinity; };
-  for (std::size_t i = 0; i < scores_.size(); ++i) {
-    if (!(scores_[i] < infinity && scores_[i] <= limit)) continue;
-    if (!(scores_[i] < score(i - 1) && scores_[i] <= score(i + 1))) continue;
-    if (const auto fit = fitter_.fit(x, y, curve, samples_.inverse_depth[i]))
-      candidates_.push_back({static_cast<int>(i), *fit});
+  for (std::size_t i = 0; i < scores_.size(); ++i)
+    if (scores_[i] < score(i - 1) && scores_[i] <= score(i + 1)) minima_.push_back({scores_[i], i});
+  std::sort(minima_.begin(), minima_.end());
+  if (minima_.size() > most) minima_.resize(most);
+  const double slack = coarseness * from_.energy(x, y);
+  double least = minima_.empty() ? 0 : minima_[0].first;
+  for (const auto& [value, i] : minima_) {
+    if (value > least + slack) break;
+    const auto fit = fitter_.fit(x, y, curve, samples_.inverse_depth[i]);
+    if (!fit) continue;
+    candidates_.push_back({static_cast<int>(i), *fit});
+    least = std::min(least, fit->distance_squared);
   }
 }
 

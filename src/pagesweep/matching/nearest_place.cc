@@ -8,28 +8,18 @@ namespace pagesweep {
 namespace {
 
 constexpr int crossings = SequenceProducts::crossings;
-using Weights = Eigen::Matrix<double, crossings, 1>;
-
-/// An interpolated sequence S = sum of value_i S_i, and its change a crossing.
+/// An interpolated sequence S = sum of value_k S_(segment - 1 + k), and its change a crossing.
 struct Interpolated {
-  Weights value = Weights::Zero(), derivative = Weights::Zero();
+  Eigen::Vector4d value, derivative;
 };
 
-Interpolated linear_at(int segment, double t) {
-  Interpolated s;
-  s.value.segment<2>(segment) << 1 - t, t;
-  s.derivative.segment<2>(segment) << -1, 1;
-  return s;
-}
+Interpolated linear_at(double t) { return {{0, 1 - t, t, 0}, {0, -1, 1, 0}}; }
 
 /// Catmull-Rom spline.
-Interpolated cubic_at(int segment, double t) {
-  Interpolated s;
-  s.value.segment<4>(segment - 1) << 0.5 * t * (-1 + t * (2 - t)), 1 + t * t * (-2.5 + 1.5 * t),
-      0.5 * t * (1 + t * (4 - 3 * t)), 0.5 * t * t * (t - 1);
-  s.derivative.segment<4>(segment - 1) << 0.5 * (-1 + t * (4 - 3 * t)), t * (-5 + 4.5 * t), 0.5 * (1 + t * (8 - 9 * t)),
-      0.5 * t * (3 * t - 2);
-  return s;
+Interpolated cubic_at(double t) {
+  return {{0.5 * t * (-1 + t * (2 - t)), 1 + t * t * (-2.5 + 1.5 * t), 0.5 * t * (1 + t * (4 - 3 * t)),
+           0.5 * t * t * (t - 1)},
+          {0.5 * (-1 + t * (4 - 3 * t)), t * (-5 + 4.5 * t), 0.5 * (1 + t * (8 - 9 * t)), 0.5 * t * (3 * t - 2)}};
 }
 
 /// How well g and an interpolated sequence S agree. \tparam affine  S is scaled by the gain that suits it best
@@ -38,10 +28,12 @@ struct Comparison {
   double step;  ///< [crossings] to the least distance, by Gauss-Newton
 };
 
-Comparison compare(const SequenceProducts& p, const Interpolated& s, bool affine) {
-  const double gs = s.value.dot(p.gs), gd = s.derivative.dot(p.gs);
-  const Weights carried = p.ss * s.value;
-  const double ss = s.value.dot(carried), sd = s.derivative.dot(carried), dd = s.derivative.dot(p.ss * s.derivative);
+Comparison compare(const SequenceProducts& p, int segment, const Interpolated& s, bool affine) {
+  const Eigen::Vector4d g = p.gs.segment<4>(segment - 1);
+  const Eigen::Matrix4d products = p.ss.block<4, 4>(segment - 1, segment - 1);
+  const Eigen::Vector4d carried = products * s.value;
+  const double gs = s.value.dot(g), gd = s.derivative.dot(g), ss = s.value.dot(carried);
+  const double sd = s.derivative.dot(carried), dd = s.derivative.dot(products * s.derivative);
   if (!affine) return {p.gg - 2 * gs + ss, 1, dd > 0 ? (gd - sd) / dd : 0};
   if (!(gs > 0 && ss > 0)) return {p.gg, 1, 0};
   const double gain = gs / ss, across = dd - sd * sd / ss;
@@ -70,18 +62,6 @@ CurvePlace make_place(const SequenceProducts& p, int segment, double share, cons
           comparison.gain, 0,     s.value, s.derivative};
 }
 
-CurvePlace nearest_on_polyline(const SequenceProducts& p, bool affine) {
-  CurvePlace nearest;
-  for (int i = 1; i + 2 < crossings; ++i) {
-    if (!is_usable(p, i) || !is_usable(p, i + 1)) continue;
-    const double share = std::clamp(best_share(p, i, affine), 0.0, 1.0);
-    const Interpolated interpolated = linear_at(i, share);
-    const Comparison here = compare(p, interpolated, affine);
-    if (here.distance_squared < nearest.distance_squared) nearest = make_place(p, i, share, interpolated, here);
-  }
-  return nearest;
-}
-
 bool has_four(const SequenceProducts& p, int segment) {
   return is_usable(p, segment - 1) && is_usable(p, segment) && is_usable(p, segment + 1) && is_usable(p, segment + 2);
 }
@@ -89,8 +69,8 @@ bool has_four(const SequenceProducts& p, int segment) {
 /// Moves on along the spline, from one segment to the next if need be.
 CurvePlace polish(const SequenceProducts& p, int segment, double share, bool affine) {
   constexpr int steps = 4;
-  Interpolated interpolated = cubic_at(segment, share);
-  Comparison here = compare(p, interpolated, affine);
+  Interpolated interpolated = cubic_at(share);
+  Comparison here = compare(p, segment, interpolated, affine);
   for (int i = 0; i < steps; ++i) {
     int next = segment;
     double next_share = share + std::clamp(here.step, -0.5, 0.5);
@@ -102,8 +82,8 @@ CurvePlace polish(const SequenceProducts& p, int segment, double share, bool aff
       --next_share;
     }
     next_share = std::clamp(next_share, 0.0, 1.0);
-    const Interpolated moved = cubic_at(next, next_share);
-    const Comparison there = compare(p, moved, affine);
+    const Interpolated moved = cubic_at(next_share);
+    const Comparison there = compare(p, next, moved, affine);
     if (!(there.distance_squared <= here.distance_squared)) break;
     const bool arrived = std::abs(here.step) < 1e-4;
     segment = next;
@@ -117,13 +97,33 @@ CurvePlace polish(const SequenceProducts& p, int segment, double share, bool aff
 
 }  // namespace
 
-CurvePlace nearest_place(const SequenceProducts& products, Normalisation normalisation, Interpolation interpolation) {
+CurvePlace nearest_on_polyline(const SequenceProducts& p, Normalisation normalisation) {
   const bool affine = normalisation == Normalisation::affine;
-  CurvePlace linear = nearest_on_polyline(products, affine);
-  if (linear.segment < 0 || !has_four(products, linear.segment)) return linear;
-  CurvePlace cubic = polish(products, linear.segment, linear.share, affine);
+  CurvePlace nearest;
+  for (int i = 1; i + 2 < crossings; ++i) {
+    if (!is_usable(p, i) || !is_usable(p, i + 1)) continue;
+    const double share = std::clamp(best_share(p, i, affine), 0.0, 1.0);
+    const Interpolated interpolated = linear_at(share);
+    const Comparison here = compare(p, i, interpolated, affine);
+    if (here.distance_squared < nearest.distance_squared) nearest = make_place(p, i, share, interpolated, here);
+  }
+  return nearest;
+}
+
+CurvePlace nearest_place(const SequenceProducts& products, const CurvePlace& start, Normalisation normalisation,
+                         Interpolation interpolation) {
+  if (start.segment < 0 || !has_four(products, start.segment)) return start;
+  CurvePlace linear = start;
+  CurvePlace cubic = polish(products, start.segment, start.share, normalisation == Normalisation::affine);
   linear.doubt = cubic.doubt = std::abs(cubic.segment + cubic.share - linear.segment - linear.share);
   return interpolation == Interpolation::cubic ? cubic : linear;
+}
+
+double distance_squared(const SequenceProducts& products, const CurvePlace& place, Normalisation normalisation) {
+  const Interpolated there{place.value, place.derivative};
+  const double distance =
+      compare(products, place.segment, there, normalisation == Normalisation::affine).distance_squared;
+  return std::max(0.0, distance);
 }
 
 }  // namespace pagesweep

@@ -57,14 +57,15 @@ class NearestPlace : public testing::TestWithParam<Normalisation> {
 TEST_P(NearestPlace, IsTheBestOfAllOnThePolyline) {
   for (unsigned seed = 0; seed < 50; ++seed) {
     const Sequence g = noisy(1.05 + 0.06 * seed, seed);
-    const CurvePlace place = nearest_place(products_of(g, s), GetParam(), Interpolation::linear);
+    const CurvePlace place = nearest_on_polyline(products_of(g, s), GetParam());
     double least = std::numeric_limits<double>::infinity();
     for (int i = 1; i <= 3; ++i)
       for (double share = 0; share <= 1; share += 1e-3)
         least = std::min(least, distance_squared(g, (1 - share) * s.col(i) + share * s.col(i + 1), affine));
     EXPECT_LE(place.distance_squared, least * (1 + 1e-9));
     EXPECT_NEAR(place.distance_squared, least, 1e-2 * least);
-    EXPECT_NEAR(distance_squared(g, s * place.value, affine), place.distance_squared, 1e-6 * place.distance_squared);
+    EXPECT_NEAR(distance_squared(g, s.middleCols<4>(place.segment - 1) * place.value, affine), place.distance_squared,
+                1e-6 * place.distance_squared);
   }
 }
 
@@ -74,7 +75,8 @@ TEST_P(NearestPlace, FindsThePlaceOfASmoothPattern) {
     const double truth = 1.02 + 0.05 * i;
     const Sequence g = (affine ? 1.3 : 1.0) * pattern(truth);
     const auto error = [&](Interpolation interpolation) {
-      const CurvePlace place = nearest_place(products_of(g, s), GetParam(), interpolation);
+      const SequenceProducts p = products_of(g, s);
+      const CurvePlace place = nearest_place(p, nearest_on_polyline(p, GetParam()), GetParam(), interpolation);
       return place.segment + place.share - truth;
     };
     linear_squares += std::pow(error(Interpolation::linear), 2);
@@ -90,10 +92,10 @@ TEST_P(NearestPlace, FindsThePlaceOfASmoothPattern) {
 TEST_P(NearestPlace, PassesOverCrossingsThatAreMissing) {
   SequenceProducts p = products_of(noisy(2.4, 1), s);
   p.usable[2] = false;
-  const CurvePlace place = nearest_place(p, GetParam(), Interpolation::cubic);
+  const CurvePlace place = nearest_on_polyline(p, GetParam());
   EXPECT_TRUE(place.segment == 3);
   p.usable.fill(false);
-  EXPECT_EQ(nearest_place(p, GetParam(), Interpolation::cubic).segment, -1);
+  EXPECT_EQ(nearest_on_polyline(p, GetParam()).segment, -1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Normalisations, NearestPlace, testing::Values(Normalisation::none, Normalisation::affine),

@@ -115,26 +115,32 @@ SequenceProducts SequenceFitter::products() const {
 /// Variance of a stored sample of the other camera, if both cameras share in the residual alike.
 double SequenceFitter::noise_variance(const CurvePlace& place) const {
   double shares = 1;
-  for (std::size_t i = 0; i < crossings; ++i)
-    shares += std::pow(place.gain * place.value[static_cast<Eigen::Index>(i)], 2) * weight_squares_[i];
+  for (std::size_t k = 0; k < 4; ++k)
+    shares +=
+        std::pow(place.gain * place.value[static_cast<Eigen::Index>(k)], 2) * weight_squares_[first_of(place) + k];
   return place.distance_squared / (freedom() * shares);
 }
 
 /// Noise is independent from crossing to crossing, so that a mixture of two has less of it, and a sum of squared
 /// differences that counts it is drawn towards the middle. Its expected part is taken out of the products.
-CurvePlace SequenceFitter::nearest_without_noise(SequenceProducts p) const {
-  const CurvePlace first = nearest_place(p, options_.normalisation, options_.interpolation);
+CurvePlace SequenceFitter::nearest_without_noise(const SequenceProducts& all) const {
+  const auto refined = [&](const SequenceProducts& p, const CurvePlace& start) {
+    return nearest_place(p, start, options_.normalisation, options_.interpolation);
+  };
+  const CurvePlace first = nearest_on_polyline(all, options_.normalisation);
   if (first.segment < 0) return first;
+  SequenceProducts p = all;
   const double noise = noise_variance(first) * from_.samples();
   for (std::size_t i = 0; i < crossings; ++i) {
     const auto index = static_cast<Eigen::Index>(i);
     p.ss(index, index) -= noise * weight_squares_[i];
   }
-  CurvePlace place = nearest_place(p, options_.normalisation, options_.interpolation);
+  CurvePlace place = nearest_on_polyline(p, options_.normalisation);
   // Noise never moves a place by more; then it was something else that is not alike.
   constexpr double farthest = 0.5;
-  if (!(std::abs(place.segment + place.share - first.segment - first.share) < farthest)) return first;
-  place.distance_squared = first.distance_squared;
+  if (!(std::abs(place.segment + place.share - first.segment - first.share) < farthest)) return refined(all, first);
+  place = refined(p, place);
+  place.distance_squared = distance_squared(all, place, options_.normalisation);
   return place;
 }
 
@@ -146,9 +152,10 @@ double SequenceFitter::sigma(const CurvePlace& place, double rounding_variance) 
   residual_ = own_;
   change_.assign(own_.size(), 0);
   double change_noise = 0;
-  for (std::size_t i = 0; i < crossings; ++i) {
-    const auto value = static_cast<float>(place.gain * place.value[static_cast<Eigen::Index>(i)]);
-    const auto change = static_cast<float>(place.gain * place.derivative[static_cast<Eigen::Index>(i)]);
+  for (std::size_t part = 0; part < 4; ++part) {
+    const std::size_t i = first_of(place) + part;
+    const auto value = static_cast<float>(place.gain * place.value[static_cast<Eigen::Index>(part)]);
+    const auto change = static_cast<float>(place.gain * place.derivative[static_cast<Eigen::Index>(part)]);
     if (value == 0 && change == 0) continue;
     for (std::size_t k = 0; k < residual_.size(); ++k) {
       residual_[k] -= value * sequence_[i][k];

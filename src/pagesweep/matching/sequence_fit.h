@@ -38,8 +38,10 @@ class SequenceFitter {
   bool find_crossings(const EpipolarCurve& curve, double inverse_depth);
   void interpolate(std::size_t crossing);
   SequenceProducts products() const;
-  CurvePlace nearest_without_noise(SequenceProducts p) const;
+  CurvePlace nearest_without_noise(const SequenceProducts& all) const;
   double noise_variance(const CurvePlace& place) const;
+  /// The crossing that the first of a place's weights belongs to.
+  static std::size_t first_of(const CurvePlace& place) { return static_cast<std::size_t>(place.segment - 1); }
   double sigma(const CurvePlace& place, double rounding_variance);
   /// Samples of a sequence less the unknowns: the place and, if free, gain and offset.
   double freedom() const { return std::max(1.0, from_.samples() - (affine_ ? 3.0 : 1.0)); }
