@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/sim/ray_caster.h"
-#include "pagesweep/base/parallel.h"
 
 #include <embree3/rtcore.h>
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <stdexcept>
+
+#include "pagesweep/base/parallel.h"
 
 namespace pagesweep::sim {
 namespace {
