@@ -40,6 +40,7 @@ function(pagesweep_library name)
     add_executable(${name}_test ${tests})
     target_link_libraries(${name}_test PRIVATE ${target} ${arg_LINK} ${arg_TEST_LINK} GTest::gmock GTest::gtest_main)
     pagesweep_warnings(${name}_test)
+    target_compile_options(${name}_test PRIVATE $<$<CONFIG:Debug>:-O0>)  # sanitized, tests take thrice as long to optimise
     gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 60 PROPERTIES LABELS unit TIMEOUT 300)
   endif()
   if(PAGESWEEP_BUILD_BENCHMARKS AND benches)
