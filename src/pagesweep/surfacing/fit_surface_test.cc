@@ -227,7 +227,7 @@ TEST(FitSurface, ReadsInAnyDirection) {
   }
 }
 
-/// A letter that was folded twice: creases of 6 degrees across the page.
+/// A letter that was folded twice: creases of 11 degrees across the page.
 double folded_letter(double x, double y) {
   if (!(std::abs(x) < 95 && std::abs(y) < 120)) return nan;
   return 12 + 0.1 * std::abs(y - 40) - 0.1 * std::abs(y + 40);
