@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <regex>
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/evaluation/time_bound.h"
@@ -14,6 +12,7 @@
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/ply_file.h"
+#include "pagesweep/io/result_files.h"
 #include "pagesweep/io/rig_file.h"
 #include "pagesweep/io/truth_file.h"
 
@@ -47,67 +46,13 @@ Rig find_rig(const EvaluationOptions& options, const std::optional<Capture>& cap
   throw bad_input(truth, "", "there is no capture.json in the folder above it that names the rig; give a rig file");
 }
 
-/// Channels of one size with the picture of the camera.
-std::vector<Image<float>> read_camera_tiff(const fs::path& file, int channels, const Camera& camera) {
-  std::vector<Image<float>> images = read_float_tiff(file, channels);
-  if (images[0].width() != camera.width || images[0].height() != camera.height)
-    throw bad_input(file, "",
-                    fmt::format("expected the size of {}, {} x {}, found {} x {}", camera.name, camera.width,
-                                camera.height, images[0].width(), images[0].height()));
-  return images;
-}
-
-Image<PixelStatus> read_status(const fs::path& file, const Camera& camera) {
-  const GrayImage image = read_gray(file, ImageSize{camera.width, camera.height});
-  const auto* codes = std::get_if<Image<std::uint8_t>>(&image);
-  if (!codes) throw bad_input(file, "", "expected 8 bit, found 16");
-  Image<PixelStatus> status(camera.width, camera.height);
-  for (std::size_t i = 0; i < status.size(); ++i) {
-    if (codes->data()[i] >= status_count)
-      throw bad_input(file, "", fmt::format("expected values below {}, found {}", status_count, codes->data()[i]));
-    status.data()[i] = static_cast<PixelStatus>(codes->data()[i]);
-  }
-  return status;
-}
-
-std::optional<PointMap> read_points(const fs::path& out, const Camera& camera) {
-  const fs::path file = out / (camera.name + "_points.tiff");
-  if (!fs::exists(file)) return std::nullopt;
-  PointMap map(camera.width, camera.height);
-  std::vector<Image<float>> xyz = read_camera_tiff(file, 3, camera);
-  map.x.swap(xyz[0]);
-  map.y.swap(xyz[1]);
-  map.z.swap(xyz[2]);
-  if (const fs::path sigma = out / (camera.name + "_point_sigma.tiff"); fs::exists(sigma))
-    map.sigma.swap(read_camera_tiff(sigma, 1, camera)[0]);
-  if (const fs::path status = out / (camera.name + "_status.png"); fs::exists(status)) {
-    map.status = read_status(status, camera);
-    return map;
-  }
-  for (std::size_t i = 0; i < map.status.size(); ++i)
-    if (std::isfinite(map.z.data()[i])) map.status.data()[i] = PixelStatus::ok;
-  return map;
-}
-
-std::optional<TimeMap> read_times(const fs::path& out, const Camera& camera) {
-  const fs::path file = out / (camera.name + "_times.tiff");
-  if (!fs::exists(file)) return std::nullopt;
-  TimeMap map(camera.width, camera.height);
-  std::vector<Image<float>> channels = read_camera_tiff(file, 4, camera);
-  map.time.swap(channels[0]);
-  map.sigma.swap(channels[1]);
-  map.amplitude.swap(channels[2]);
-  map.residual.swap(channels[3]);
-  for (std::size_t i = 0; i < map.status.size(); ++i)
-    if (std::isfinite(map.time.data()[i])) map.status.data()[i] = PixelStatus::ok;
-  return map;
-}
-
 std::vector<CameraData> read_cameras(const fs::path& out, const Truth& truth, const Rig& rig) {
   std::vector<CameraData> cameras;
   for (const Camera& camera : rig.cameras) {
     if (!fs::exists(truth.camera_points_path(camera.name))) continue;
-    CameraData data{&camera, read_camera_points(truth, camera.name), read_points(out, camera), read_times(out, camera)};
+    const CameraFiles files(out, camera.name);
+    CameraData data{&camera, read_camera_points(truth, camera.name), read_point_map(files, camera),
+                    read_time_map(files, camera)};
     if (data.truth.width() != camera.width || data.truth.height() != camera.height)
       throw bad_input(truth.camera_points_path(camera.name), "", "its size is not the camera's in the rig");
     cameras.push_back(std::move(data));
@@ -121,7 +66,7 @@ std::optional<ErrorSummary> summarise_clipped(const fs::path& out, const std::ve
   std::vector<double> errors;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const Camera& camera = *cameras[c].camera;
-    const fs::path file = out / (camera.name + "_clipped.png");
+    const fs::path file = CameraFiles(out, camera.name).clipped;
     if (!fs::exists(file)) return std::nullopt;
     const GrayImage counts = read_gray(file, ImageSize{camera.width, camera.height});
     std::visit(
@@ -178,39 +123,25 @@ void evaluate_times(const std::vector<CameraData>& cameras, const Rig& rig, cons
     evaluation.times = compare_times(views, *rig.light, options.times, bound);
 }
 
-/// Numbers of the pages that a result has.
-std::vector<int> pages_in(const fs::path& out) {
-  static const std::regex pattern("page_([1-9][0-9]{0,3})_scanmap\\.tiff");
-  std::vector<int> pages;
-  for (const auto& entry : fs::directory_iterator(out)) {
-    const std::string name = entry.path().filename().string();
-    if (std::smatch match; std::regex_match(name, match, pattern)) pages.push_back(std::stoi(match[1]));
-  }
-  std::sort(pages.begin(), pages.end());
-  return pages;
-}
-
 /// The resolution that the page's picture states; 0 if it states none.
-double page_scale(const fs::path& out, int index) {
-  for (const char* extension : {".png", ".tiff", ".tif", ".jp2", ".jpg", ".jpeg"})
-    if (const fs::path file = out / fmt::format("page_{}{}", index, extension); fs::exists(file))
-      return read_picture(file).pixels_per_mm;
-  return 0;
+double page_scale(const PageFiles& files) {
+  const auto pictures = files.pictures();
+  return pictures.empty() ? 0 : read_picture(pictures.front()).pixels_per_mm;
 }
 
 PageEvaluation evaluate_page(const fs::path& out, const Truth& truth, const TruthPage& page,
                              const EvaluationOptions& options) {
   PageEvaluation evaluation{page.index, {}, {}};
-  const fs::path file = out / fmt::format("page_{}_scanmap.tiff", page.index);
-  const double pixels_per_mm = page_scale(out, page.index);
-  if (!fs::exists(file)) {
+  const PageFiles files(out, page.index);
+  const double pixels_per_mm = page_scale(files);
+  if (!fs::exists(files.scan_map)) {
     evaluation.reason = "the result does not have this page";
   } else if (!(pixels_per_mm > 0)) {
     evaluation.reason = "there is no picture of this page that states its resolution";
   } else if (!fs::exists(truth.page_scan_map_path(page.index))) {
     evaluation.reason = "the truth has no scan map of this page";
   } else {
-    const ScanMap result_map = read_scan_map(file);
+    const ScanMap result_map = read_scan_map(files.scan_map);
     const ScanMap true_map = read_page_scan_map(truth, page.index);
     evaluation.errors = compare_pages({&result_map, pixels_per_mm}, {&true_map, page.pixels_per_mm}, options.pages);
     if (evaluation.errors->displacement.count == 0) {
