@@ -131,6 +131,49 @@ std::string format_figure(const PictureFigure& figure) {
   return html;
 }
 
+PictureFigure photo_figure(const Picture& picture, int longest_px, const PictureEncoder& encoder) {
+  const Picture small = shrink(picture, longest_px);
+  PictureFigure figure;
+  figure.url = encoder.photo(small);
+  figure.width = small.width();
+  figure.height = small.height();
+  return figure;
+}
+
+PictureFigure map_figure(const Image<float>& values, Ramp ramp, Range range, std::string_view unit,
+                         const PictureEncoder& encoder) {
+  PictureFigure figure =
+      photo_figure(draw_map(values, ramp, range), std::max(values.width(), values.height()), encoder);
+  figure.has_bar = true;
+  figure.ramp = ramp;
+  figure.range = range;
+  figure.unit = unit;
+  return figure;
+}
+
+std::string format_page_head(std::string_view kicker, std::string_view title) {
+  return fmt::format(
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{0} – {1}</title>\n"
+      "<style>{2}</style></head>\n<body>\n<header><p class=\"kicker\">{1}</p><h1>{0}</h1></header>\n",
+      escape_html(title), escape_html(kicker), report_style());
+}
+
+std::string format_section(std::string_view title, std::string_view lead, const std::string& body) {
+  if (body.empty()) return "";
+  return fmt::format("<section><h2>{}</h2>\n<p class=\"lead\">{}</p>\n{}</section>\n", escape_html(title),
+                     escape_html(lead), body);
+}
+
+std::string format_row(std::string_view columns, const std::string& figures) {
+  return figures.empty() ? "" : fmt::format("<div class=\"row {}\">\n{}</div>\n", columns, figures);
+}
+
+std::string format_tile(const std::string& value, std::string_view unit, std::string_view what) {
+  return fmt::format("<div><b>{} <small>{}</small></b><span>{}</span></div>", escape_html(value), escape_html(unit),
+                     escape_html(what));
+}
+
 std::string format_figures(std::span<const Figure> figures) {
   std::string html, group;
   for (const Figure& figure : figures) {

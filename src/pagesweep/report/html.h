@@ -53,6 +53,21 @@ struct PictureFigure {
 };
 std::string format_figure(const PictureFigure& figure);
 
+/// A picture, no side of it longer than `longest_px`; title and caption are to be filled in.
+PictureFigure photo_figure(const Picture& picture, int longest_px, const PictureEncoder& encoder);
+/// Likewise a map in colours with its bar.
+PictureFigure map_figure(const Image<float>& values, Ramp ramp, Range range, std::string_view unit,
+                         const PictureEncoder& encoder);
+
+/// The page from its first byte to its heading. \param kicker  what kind of page it is, above the title
+std::string format_page_head(std::string_view kicker, std::string_view title);
+/// A heading, a sentence and what belongs to them; empty if `body` is.
+std::string format_section(std::string_view title, std::string_view lead, const std::string& body);
+/// Figures side by side: \param columns  "two", "four", "wide" or "surface", see report_style()
+std::string format_row(std::string_view columns, const std::string& figures);
+/// One number in large letters, of those that stand in a <div class="tiles">.
+std::string format_tile(const std::string& value, std::string_view unit, std::string_view what);
+
 /// A bar in a ramp's colours with the values at its ends and in its middle.
 std::string format_colour_bar(Ramp ramp, Range range, std::string_view unit);
 

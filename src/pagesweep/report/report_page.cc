@@ -49,37 +49,6 @@ std::string_view words_of(PixelStatus status) {
   return "unknown";
 }
 
-std::string section(std::string_view title, std::string_view lead, const std::string& body) {
-  if (body.empty()) return "";
-  return fmt::format("<section><h2>{}</h2>\n<p class=\"lead\">{}</p>\n{}</section>\n", escape_html(title),
-                     escape_html(lead), body);
-}
-
-std::string row(std::string_view columns, const std::string& figures) {
-  return figures.empty() ? "" : fmt::format("<div class=\"row {}\">\n{}</div>\n", columns, figures);
-}
-
-PictureFigure photo_figure(const Picture& picture, int longest_px, const PictureEncoder& encoder) {
-  const Picture small = shrink(picture, longest_px);
-  PictureFigure figure;
-  figure.url = encoder.photo(small);
-  figure.width = small.width();
-  figure.height = small.height();
-  return figure;
-}
-
-/// A map in colours with its bar.
-PictureFigure map_figure(const Image<float>& values, Ramp ramp, Range range, std::string_view unit,
-                         const PictureEncoder& encoder) {
-  PictureFigure figure =
-      photo_figure(draw_map(values, ramp, range), std::max(values.width(), values.height()), encoder);
-  figure.has_bar = true;
-  figure.ramp = ramp;
-  figure.range = range;
-  figure.unit = unit;
-  return figure;
-}
-
 // The verdict ---------------------------------------------------------------------------------------------------------
 
 std::string format_verdict(const Verdict& verdict, std::span<const std::string> warnings) {
@@ -89,11 +58,6 @@ std::string format_verdict(const Verdict& verdict, std::span<const std::string> 
   if (!remarks.empty()) remarks = "<ul>" + remarks + "</ul>";
   return fmt::format("<div class=\"verdict {}\"><p class=\"headline\">{}.</p><p class=\"advice\">{}</p>{}</div>\n",
                      name_of(verdict.level), escape_html(verdict.headline), escape_html(verdict.advice), remarks);
-}
-
-std::string tile(const std::string& value, std::string_view unit, std::string_view what) {
-  return fmt::format("<div><b>{} <small>{}</small></b><span>{}</span></div>", escape_html(value), escape_html(unit),
-                     escape_html(what));
 }
 
 std::string format_tiles(const ReportInputs& inputs) {
@@ -108,16 +72,17 @@ std::string format_tiles(const ReportInputs& inputs) {
   }
   for (const Page& page : inputs.pages)
     if (const double scale = page.picture.pixels_per_mm; scale > 0)
-      tiles += tile(fmt::format("{:.1f} × {:.1f}", page.picture.width() / scale, page.picture.height() / scale), "mm",
-                    fmt::format("page {} at {:.0f} dpi", page.index, 25.4 * scale));
-  tiles += tile(format_number(points), "", "points");
-  tiles += tile(format_number(typical_sigma(inputs.cameras)), "mm", "typical depth error, claimed");
+      tiles += format_tile(fmt::format("{:.1f} × {:.1f}", page.picture.width() / scale, page.picture.height() / scale),
+                           "mm", fmt::format("page {} at {:.0f} dpi", page.index, 25.4 * scale));
+  tiles += format_tile(format_number(points), "", "points");
+  tiles += format_tile(format_number(typical_sigma(inputs.cameras)), "mm", "typical depth error, claimed");
   if (frames > 0)
-    tiles += tile(fmt::format("{}", frames), "",
-                  dropped == 0 ? "frames a camera, none dropped" : fmt::format("frames a camera, {} dropped", dropped));
+    tiles += format_tile(
+        fmt::format("{}", frames), "",
+        dropped == 0 ? "frames a camera, none dropped" : fmt::format("frames a camera, {} dropped", dropped));
   double seconds = 0;
   for (const StationTime& time : inputs.times) seconds += time.seconds;
-  if (seconds > 0) tiles += tile(format_number(seconds), "s", "to measure and flatten");
+  if (seconds > 0) tiles += format_tile(format_number(seconds), "s", "to measure and flatten");
   return "<div class=\"tiles\">" + tiles + "</div>\n";
 }
 
@@ -142,7 +107,8 @@ std::string format_pages(const ReportInputs& inputs, const PictureEncoder& encod
     after += format_figure(figure);
   }
   // A spread on one row and its pages on the next are to the same scale; a single page stands beside its scan.
-  return inputs.pages.size() > 1 ? row("one", before) + row("two", after) : row("two", before + after);
+  return inputs.pages.size() > 1 ? format_row("one", before) + format_row("two", after)
+                                 : format_row("two", before + after);
 }
 
 std::string format_relief(const ReportInputs& inputs, const PictureEncoder& encoder) {
@@ -171,7 +137,7 @@ std::string format_relief(const ReportInputs& inputs, const PictureEncoder& enco
     differences += format_figure(figure);
   }
   if (differences.empty()) return format_figure(relief);
-  return row("surface", format_figure(relief) + differences);
+  return format_row("surface", format_figure(relief) + differences);
 }
 
 // Cameras -------------------------------------------------------------------------------------------------------------
@@ -258,7 +224,7 @@ std::string format_cameras(const ReportInputs& inputs, const PictureEncoder& enc
   std::string html;
   for (const CameraReport& camera : inputs.cameras) {
     const std::string times = format_times(camera, encoder), points = format_points(camera, encoder);
-    html += row(times.empty() || points.empty() ? "two" : "four", times + points);
+    html += format_row(times.empty() || points.empty() ? "two" : "four", times + points);
   }
   const std::string table = format_status_table(inputs);
   std::string profile = format_profile(inputs.profile);
@@ -267,7 +233,7 @@ std::string format_cameras(const ReportInputs& inputs, const PictureEncoder& enc
               "<figcaption><b>The stripe as a pixel sees it.</b> Light over time in frames, learned from this capture; "
               "every time value is the place of this shape in a pixel's gray values.</figcaption></figure>\n";
   if (table.empty() || profile.empty()) return html + table + profile;
-  return html + row("wide", "<div>" + table + "</div>" + profile);
+  return html + format_row("wide", "<div>" + table + "</div>" + profile);
 }
 
 // Tables --------------------------------------------------------------------------------------------------------------
@@ -307,24 +273,21 @@ std::string format_details(const ReportInputs& inputs) {
 }  // namespace
 
 std::string format_report(const ReportInputs& inputs, const Verdict& verdict, const PictureEncoder& encoder) {
-  std::string html = fmt::format(
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{0} – scan report</title>\n"
-      "<style>{1}</style></head>\n<body>\n<header><p class=\"kicker\">Scan report</p><h1>{0}</h1></header>\n",
-      escape_html(inputs.title), report_style());
+  std::string html = format_page_head("Scan report", inputs.title);
   html += format_verdict(verdict, inputs.warnings);
   html += format_tiles(inputs);
-  html += section("Pages", "Each page as the scanner saw it, and laid flat with the measured surface.",
-                  format_pages(inputs, encoder));
-  html += section("Surface", "Every pixel of both cameras that saw the stripe pass gives one point of the paper.",
-                  format_relief(inputs, encoder));
+  html += format_section("Pages", "Each page as the scanner saw it, and laid flat with the measured surface.",
+                         format_pages(inputs, encoder));
   html +=
-      section("Measurement",
-              "From light to points: how bright the stripe was at each pixel, when it passed, how certain the depth is "
-              "that follows, and where there is none.",
-              format_cameras(inputs, encoder));
+      format_section("Surface", "Every pixel of both cameras that saw the stripe pass gives one point of the paper.",
+                     format_relief(inputs, encoder));
+  html += format_section(
+      "Measurement",
+      "From light to points: how bright the stripe was at each pixel, when it passed, how certain the depth is "
+      "that follows, and where there is none.",
+      format_cameras(inputs, encoder));
   html += std::string(evaluation_begin) + std::string(evaluation_end) + "\n";
-  html += section("Details", "", format_details(inputs));
+  html += format_section("Details", "", format_details(inputs));
   html += fmt::format("<footer>{}</footer>\n</body></html>\n", escape_html(inputs.program));
   return html;
 }
@@ -341,10 +304,11 @@ std::string format_evaluation(std::span<const Figure> figures, std::span<const F
     figure.caption = map.caption;
     pictures += format_figure(figure);
   }
-  return section("Against the truth",
-                 "This capture is synthetic, so what should have been measured is known. The figures are defined in "
-                 "docs/evaluation.md.",
-                 row(maps.size() > 2 ? "four" : "two", pictures) + format_figures(figures));
+  return format_section(
+      "Against the truth",
+      "This capture is synthetic, so what should have been measured is known. The figures are defined in "
+      "docs/evaluation.md.",
+      format_row(maps.size() > 2 ? "four" : "two", pictures) + format_figures(figures));
 }
 
 }  // namespace pagesweep

@@ -19,7 +19,7 @@ h1 { margin: .1rem 0 1.6rem; font-size: 1.5rem; font-weight: 600; overflow-wrap:
 h2 { margin: 3.2rem 0 .4rem; font-size: 1.2rem; font-weight: 600; }
 h3 { margin: 1.8rem 0 .5rem; font-size: 1rem; font-weight: 600; }
 p.lead { margin: 0 0 1.2rem; max-width: 46rem; color: var(--soft); }
-.verdict { padding: 1.3rem 1.6rem; background: var(--card); border: 1px solid var(--line); border-radius: 8px;
+.verdict { --level: var(--accent); padding: 1.3rem 1.6rem; background: var(--card); border: 1px solid var(--line); border-radius: 8px;
   border-left: 6px solid var(--level); }
 .verdict.good { --level: var(--good); } .verdict.look { --level: var(--look); }
 .verdict.scan_again { --level: var(--scan_again); }
