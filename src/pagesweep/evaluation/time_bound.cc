@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/evaluation/time_bound.h"
 
-#include <Eigen/Core>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "pagesweep/planning/time_variance.h"
 
 namespace pagesweep {
 namespace {
@@ -44,18 +44,16 @@ double TimeBound::variance(double amplitude_gray, double phase_frames) const {
   const double end = profile_.start_frames + profile_.step_frames * static_cast<double>(profile_.values.size() - 1);
   // Half a step to both sides: the slope of the piecewise linear profile, averaged over its corners.
   const double h = 0.5 * profile_.step_frames;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  std::vector<BellSample> bell;
   for (int i = static_cast<int>(std::floor(profile_.start_frames)) - 1; i <= end + 1; ++i) {
     const double since_middle = i - phase_frames;
-    const double gray = amplitude_gray * light_at(since_middle);
-    if (gray >= clips_at_gray_) continue;
-    const double slope = (light_at(since_middle + h) - light_at(since_middle - h)) / (2 * h);
-    const Eigen::Vector3d gradient(-amplitude_gray * slope, light_at(since_middle), 1);  // by t, A, b
-    const double noise = gray / sensor_.gain_e_per_gray + std::pow(sensor_.read_noise_gray, 2) + 1.0 / 12;
-    information += gradient * gradient.transpose() / noise;
+    bell.push_back({light_at(since_middle), (light_at(since_middle + h) - light_at(since_middle - h)) / (2 * h)});
   }
-  const Eigen::FullPivLU<Eigen::Matrix3d> factors(information);
-  return factors.isInvertible() ? factors.inverse()(0, 0) : std::numeric_limits<double>::infinity();
+  SampleNoise noise;
+  noise.shot_gray = 1 / sensor_.gain_e_per_gray;
+  noise.read_variance = std::pow(sensor_.read_noise_gray, 2);
+  noise.clips_at_gray = clips_at_gray_;
+  return time_variance(bell, amplitude_gray, noise).total();
 }
 
 double TimeBound::operator()(double amplitude_gray) const {
