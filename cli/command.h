@@ -30,6 +30,7 @@ void add_reconstruct_command(CLI::App& app);
 void add_dewarp_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
+void add_plan_command(CLI::App& app);
 void add_info_command(CLI::App& app);
 
 }  // namespace pagesweep::cli

@@ -41,6 +41,7 @@ void add_commands(CLI::App& app) {
   add_dewarp_command(app);
   add_simulate_command(app);
   add_evaluate_command(app);
+  add_plan_command(app);
   add_info_command(app);
 }
 

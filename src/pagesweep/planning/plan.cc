@@ -52,18 +52,21 @@ struct MeanSquare {
 constexpr double SpotAccuracy::* fields[] = {&SpotAccuracy::match_px, &SpotAccuracy::stereo_mm, &SpotAccuracy::joint_mm,
                                              &SpotAccuracy::section_mm, &SpotAccuracy::height_share};
 
-/// Root mean squares over the cameras.
+/// Root mean squares over the cameras; a section by the one that does it better.
 SpotAccuracy plan_spot(const PlanRequest& request, double time_sigma, const Eigen::Vector3d& spot) {
   MeanSquare means[std::size(fields)];
+  double best_section = SpotAccuracy::missing;
   for (const Camera& camera : request.cameras) {
     const Camera* other = request.cameras.size() < 2          ? nullptr
                           : &camera == request.cameras.data() ? &request.cameras.back()
                                                               : &request.cameras.front();
     const SpotAccuracy accuracy = plan_point(camera, other, request.light, time_sigma, spot);
     for (std::size_t f = 0; f < std::size(fields); ++f) means[f].add(accuracy.*fields[f]);
+    best_section = std::fmin(best_section, accuracy.section_mm);  // of a missing and a finite value, the finite one
   }
   SpotAccuracy mean;
   for (std::size_t f = 0; f < std::size(fields); ++f) mean.*fields[f] = means[f].root();
+  mean.section_mm = best_section;
   return mean;
 }
 
@@ -93,14 +96,16 @@ Plan plan_only(const PlanRequest& request) {
   require_sound(request);
   Plan plan;
   plan.request = request;
-  plan.mm_per_frame = speed_on_table(request.light, middle_of(request.table));
-  if (!(plan.mm_per_frame > 0)) throw no_result("the sheet of light never passes the middle of the table");
+  const double own_speed = speed_on_table(request.light, middle_of(request.table));
+  if (!(own_speed > 0)) throw no_result("the sheet of light never passes the middle of the table");
+  plan.mm_per_frame = request.mm_per_frame != 0 ? request.mm_per_frame : own_speed;
   plan.stripe_frames = request.recording.stripe_mm / plan.mm_per_frame;
   plan.time = plan_time(request.recording, plan.mm_per_frame);
+  // In a frame a faster light gets farther: its times, counted in frames of the rig's own light, are less certain.
+  const double own_time_sigma = plan.time_sigma() * plan.mm_per_frame / own_speed;
   if (request.cameras.size() == 2)
     plan.baseline_mm = (request.cameras[1].center() - request.cameras[0].center()).norm();
-  for (const double height : request.heights_mm)
-    plan.heights.push_back(plan_height(request, plan.time_sigma(), height));
+  for (const double height : request.heights_mm) plan.heights.push_back(plan_height(request, own_time_sigma, height));
   return plan;
 }
 
@@ -110,13 +115,6 @@ double median_height_error(const PlanRequest& request) {
   const Plan plan = plan_only(coarse);
   if (!std::isfinite(plan.time.total())) return std::numeric_limits<double>::infinity();
   return spread_of(plan.heights, plan.method(), true).median;
-}
-
-Light at_speed(const Light& light, double factor) {
-  Light::Model model = light.model();
-  if (auto* plane = std::get_if<TranslatingPlane>(&model)) plane->offset_per_frame *= factor;
-  if (auto* plane = std::get_if<RotatingPlane>(&model)) plane->angle_per_frame *= factor;
-  return Light(model);
 }
 
 /// Each thing that can be chosen, at half and at twice its value (the gray depth two bits up and down).
@@ -134,7 +132,7 @@ std::vector<Variation> vary(const PlanRequest& request, double mm_per_frame) {
     add("stripe" + size, fmt::format("stripe {:.3g} mm wide, as bright", factor * plan.stripe_mm),
         [&](PlanRequest& varied) { varied.recording.stripe_mm *= factor; });
     add("speed" + size, fmt::format("{:.3g} mm a frame", factor * mm_per_frame),
-        [&](PlanRequest& varied) { varied.light = at_speed(varied.light, factor); });
+        [&](PlanRequest& varied) { varied.mm_per_frame = factor * mm_per_frame; });
     add("light" + size,
         fmt::format("{} the light{}", factor < 1 ? "half" : "twice", factor * plan.amplitude > 1 ? ", clipped" : ""),
         [&](PlanRequest& varied) { varied.recording.amplitude *= factor; });
@@ -174,12 +172,7 @@ std::optional<TableExtent> extent_named(std::string_view text) {
   return is_whole && is_sound ? std::optional(extent) : std::nullopt;
 }
 
-std::optional<Light> planned_light(const Rig& rig, double mm_per_frame, const TableExtent& table) {
-  if (!rig.light && !(mm_per_frame > 0)) return std::nullopt;
-  if (!rig.light) return Light(TranslatingPlane{Eigen::Vector3d::UnitY(), 0, mm_per_frame});
-  if (!(mm_per_frame > 0)) return rig.light;
-  return at_speed(*rig.light, mm_per_frame / speed_on_table(*rig.light, middle_of(table)));
-}
+Light upright_light() { return Light(TranslatingPlane{Eigen::Vector3d::UnitY(), 0, 1}); }
 
 double speed_on_table(const Light& light, const Eigen::Vector3d& place) {
   const Eigen::Vector2d slope(time_slope(light, place, Eigen::Vector3d::UnitX()),

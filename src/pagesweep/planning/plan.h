@@ -26,20 +26,19 @@ struct TableExtent {
 /// y = -20); nothing if it is none of these.
 std::optional<TableExtent> extent_named(std::string_view text);
 
+/// A sheet of light at right angles to the table that moves along y, a millimetre a frame.
+Light upright_light();
+
 /// What is to be planned.
 struct PlanRequest {
   std::vector<Camera> cameras;  ///< one or two
-  Light light;
+  Light light = upright_light();
+  double mm_per_frame = 0;  ///< speed of the light on the table's middle; 0: as the light has it
   RecordingPlan recording;
   TableExtent table;
   std::vector<double> heights_mm = {0, 30, 60};  ///< of the paper above the table
   double grid_mm = 5;
 };
-
-/// The sheet of light of a rig, or an upright one that moves along y, at the speed asked for.
-/// \param mm_per_frame  on the table at `table`'s middle; 0: as the rig has it
-/// \return              nothing if the rig has no light and no speed is given
-std::optional<Light> planned_light(const Rig& rig, double mm_per_frame, const TableExtent& table);
 
 /// How fast the stripe runs over the table at a place of z = 0 [mm/frame]; NaN if it never comes there.
 double speed_on_table(const Light& light, const Eigen::Vector3d& place);
@@ -54,7 +53,7 @@ struct Spread {
 struct HeightPlan {
   double height_mm = 0;
   Image<std::uint8_t> cameras;  ///< how many see the spot
-  Image<SpotAccuracy> spots;    ///< root mean squares over the cameras that see it
+  Image<SpotAccuracy> spots;    ///< root mean squares over the cameras that see it; section: the better one
   /// Values of a field of SpotAccuracy, or of the height z that belongs to it.
   Image<float> map_of(double SpotAccuracy::* field) const;
   Image<float> height_map_of(double SpotAccuracy::* field) const;  ///< [mm]

@@ -112,21 +112,31 @@ TEST(MakePlan, RefusesWhatCannotBeMeasured) {
   EXPECT_THROW(make_plan(request), std::invalid_argument);
 }
 
-TEST(PlannedLight, TakesTheSpeedAskedFor) {
-  const TableExtent table;
+TEST(MakePlan, TakesAnotherSpeedThanTheRigs) {
   for (const Light& light :
        {*rig.light,
         Light(RotatingPlane{{0, -60, 500}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), -0.3, 0.003})}) {
-    Rig with = rig;
-    with.light = light;
-    EXPECT_NEAR(speed_on_table(*planned_light(with, 0, table), Eigen::Vector3d::Zero()),
-                speed_on_table(light, Eigen::Vector3d::Zero()), 1e-9);
-    EXPECT_NEAR(speed_on_table(*planned_light(with, 0.5, table), Eigen::Vector3d::Zero()), 0.5, 1e-6);
+    PlanRequest request = request_for(rig);
+    request.light = light;
+    const Plan own = make_plan(request);
+    EXPECT_NEAR(own.mm_per_frame, speed_on_table(light, Eigen::Vector3d::Zero()), 1e-12);
+    request.mm_per_frame = 2 * own.mm_per_frame;
+    request.recording.stripe_mm *= 2;  // as many frames, and hence the same uncertainty in frames
+    const Plan fast = make_plan(request);
+    EXPECT_NEAR(fast.time_sigma(), own.time_sigma(), 1e-12);
+    EXPECT_NEAR(spread_of(fast.heights, fast.method(), true).median / spread_of(own.heights, own.method(), true).median,
+                2, 1e-6);
   }
-  Rig without = rig;
-  without.light.reset();
-  EXPECT_FALSE(planned_light(without, 0, table));
-  EXPECT_NEAR(speed_on_table(*planned_light(without, 2, table), Eigen::Vector3d(30, 20, 0)), 2, 1e-9);
+}
+
+TEST(MakePlan, WithoutTheRigsLightAnUprightOneIsTaken) {
+  PlanRequest request = request_for(rig);
+  const Plan with = make_plan(request);
+  request.light = upright_light();
+  request.mm_per_frame = 1.7;
+  const Plan without = make_plan(request);
+  EXPECT_NEAR(spread_of(without.heights, without.method(), true).worst,
+              spread_of(with.heights, with.method(), true).worst, 1e-6);
 }
 
 TEST(SpreadCameras, KeepsWhatTheyLookAt) {

@@ -76,6 +76,14 @@ Range symmetric_range_of(const Image<float>& values, double tail) {
   return {-size, size};
 }
 
+double round_step(Range range, int lines) {
+  const double wanted = (range.high - range.low) / lines;
+  if (!(wanted > 0)) return 1;
+  const double power = std::pow(10, std::floor(std::log10(wanted)));
+  const double factor = wanted / power;
+  return power * (factor < 1.5 ? 1 : factor < 3.5 ? 2 : factor < 7.5 ? 5 : 10);
+}
+
 Picture draw_map(const Image<float>& values, Ramp ramp, Range range) {
   return draw(values.width(), values.height(),
               [&](int x, int y) { return colour_of(ramp, share_of(values(x, y), range)); });

@@ -24,6 +24,9 @@ Range range_of(const Image<float>& values, double tail = 0.01);
 /// The same, but even about 0 for deviations.
 Range symmetric_range_of(const Image<float>& values, double tail = 0.01);
 
+/// 1, 2 or 5 times a power of ten, so that about `lines` contours cross the range.
+double round_step(Range range, int lines);
+
 /// A map in colours: RGB, 8 bit, one pixel a value.
 Picture draw_map(const Image<float>& values, Ramp ramp, Range range);
 

@@ -142,15 +142,6 @@ std::string format_relief(const ReportInputs& inputs, const PictureEncoder& enco
 
 // Cameras -------------------------------------------------------------------------------------------------------------
 
-/// 1, 2 or 5 times a power of ten, so that about `lines` contours cross the range.
-double contour_step(Range range, int lines) {
-  const double wanted = (range.high - range.low) / lines;
-  if (!(wanted > 0)) return 1;
-  const double power = std::pow(10, std::floor(std::log10(wanted)));
-  const double factor = wanted / power;
-  return power * (factor < 1.5 ? 1 : factor < 3.5 ? 2 : factor < 7.5 ? 5 : 10);
-}
-
 std::string format_times(const CameraReport& camera, const PictureEncoder& encoder) {
   if (!camera.times) return "";
   const Image<float> amplitude = shrink(camera.times->amplitude, map_px);
@@ -160,7 +151,7 @@ std::string format_times(const CameraReport& camera, const PictureEncoder& encod
 
   const Image<float> time = shrink(camera.times->time, map_px);
   const Range range = range_of(time, 0.002);
-  const double step = contour_step(range, 16);
+  const double step = round_step(range, 16);
   PictureFigure when = photo_figure(draw_contours(time, Ramp::sequential, range, step), map_px, encoder);
   when.title = camera.name + ": time.";
   when.caption =

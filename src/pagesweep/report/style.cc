@@ -33,10 +33,10 @@ p.lead { margin: 0 0 1.2rem; max-width: 46rem; color: var(--soft); }
 .tiles b small { font-size: .9rem; font-weight: 400; color: var(--soft); }
 .tiles span { color: var(--soft); font-size: .85rem; }
 .row { display: grid; gap: 1.6rem; align-items: start; margin-bottom: 1.6rem; }
-.two { grid-template-columns: 1fr 1fr; } .four { grid-template-columns: repeat(4, 1fr); }
+.two { grid-template-columns: 1fr 1fr; } .three { grid-template-columns: repeat(3, 1fr); } .four { grid-template-columns: repeat(4, 1fr); }
 .wide { grid-template-columns: minmax(0, 2fr) minmax(0, 1fr); }
 .surface { grid-template-columns: minmax(0, 2.3fr) repeat(auto-fit, minmax(180px, 1fr)); }
-@media (max-width: 800px) { .two, .wide, .surface { grid-template-columns: 1fr; } .four { grid-template-columns: 1fr 1fr; } }
+@media (max-width: 800px) { .two, .three, .wide, .surface { grid-template-columns: 1fr; } .four { grid-template-columns: 1fr 1fr; } }
 figure { margin: 0; } figure img { display: block; width: 100%; height: auto; border-radius: 4px;
   border: 1px solid var(--line); background: #d6d8db; }
 figcaption { margin-top: .45rem; color: var(--soft); font-size: .88rem; line-height: 1.45; }
