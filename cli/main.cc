@@ -25,7 +25,7 @@ constexpr const char* footer = R"(Try it without a scanner:
 
 Exit status: 0 done; 1 a defect of this program; 2 wrong usage; 3 an input that cannot be used;
 4 an input that cannot be read; 5 an output that cannot be written; 6 nothing could be measured;
-128 + n ended by signal n.
+7 a limit of an acceptance test is exceeded; 128 + n ended by signal n.
 )";
 
 void add_commands(CLI::App& app) {
@@ -42,6 +42,7 @@ void add_commands(CLI::App& app) {
   add_simulate_command(app);
   add_evaluate_command(app);
   add_plan_command(app);
+  add_acceptance_command(app);
   add_info_command(app);
 }
 
@@ -67,6 +68,8 @@ int run(CLI::App& app, int argc, char** argv) {
     return complain(exit_code_of(error.kind()), error.what());
   } catch (const std::invalid_argument& error) {  // an option's value that a station refuses
     return complain(usage_error, error.what());
+  } catch (const LimitExceeded&) {  // the answer has said so
+    return limit_exceeded;
   } catch (const Interrupted& interrupted) {
     return complain(128 + interrupted.signal, "interrupted");
   } catch (const std::bad_alloc&) {
