@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "pagesweep/surfacing/b_spline.h"
+#include "pagesweep/base/b_spline.h"
 
 namespace pagesweep {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pagesweep/surfacing/b_spline.h"
+#include "pagesweep/base/b_spline.h"
 
 #include <algorithm>
 #include <cmath>
