@@ -38,7 +38,8 @@ std::string model_name(const Scanner& scanner) {
 }
 
 std::string model_name(const Light& light) {
-  return std::holds_alternative<TranslatingPlane>(light.model()) ? "translating-plane" : "rotating-plane";
+  if (std::holds_alternative<TranslatingPlane>(light.model())) return "translating-plane";
+  return std::holds_alternative<RotatingPlane>(light.model()) ? "rotating-plane" : "recorded-planes";
 }
 
 Description describe_camera(const Camera& camera) {

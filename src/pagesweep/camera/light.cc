@@ -2,6 +2,7 @@
 #include "pagesweep/camera/light.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace pagesweep {
@@ -36,6 +37,51 @@ std::optional<double> passing_time(const RotatingPlane& light, const Eigen::Vect
   return (principal - light.angle0) / light.angle_per_frame;
 }
 
+Plane plane_of(const RecordedPlanes& light, double time) {
+  const double place = time - light.first_frame;
+  const auto last = static_cast<double>(light.planes.size() - 2);
+  const double before = std::clamp(std::floor(place), 0.0, last);
+  const double part = place - before;
+  const Plane &a = light.planes[static_cast<std::size_t>(before)],
+              &b = light.planes[static_cast<std::size_t>(before) + 1];
+  const Eigen::Vector3d normal = (1 - part) * a.normal + part * b.normal;
+  const double length = normal.norm();
+  return {normal / length, ((1 - part) * a.offset + part * b.offset) / length};
+}
+
+/// Of the intervals between frames, the one at whose ends the point lies on different sides of the plane; an outermost
+/// one if there is none.
+std::optional<double> passing_time(const RecordedPlanes& light, const Eigen::Vector3d& point) {
+  const auto distance = [&](std::size_t k) { return light.planes[k].distance(point); };
+  std::size_t low = 0, high = light.planes.size() - 1;
+  const bool rises = distance(high) > distance(low);
+  while (high - low > 1) {
+    const std::size_t middle = (low + high) / 2;
+    ((distance(middle) > 0) == rises ? high : low) = middle;
+  }
+  const double at_low = distance(low), step = distance(high) - at_low;
+  if (step == 0) return std::nullopt;
+  return light.first_frame + static_cast<double>(low) - at_low / step;
+}
+
+TranslatingPlane sped_up(TranslatingPlane light, double factor) {
+  light.offset_per_frame *= factor;
+  return light;
+}
+
+RotatingPlane sped_up(RotatingPlane light, double factor) {
+  light.angle_per_frame *= factor;
+  return light;
+}
+
+RecordedPlanes sped_up(const RecordedPlanes& light, double factor) {
+  const double last = light.first_frame + static_cast<double>(light.planes.size() - 1);
+  RecordedPlanes faster{static_cast<int>(std::floor(light.first_frame / factor)), {}};
+  const int frames = std::max(2, static_cast<int>(std::ceil(last / factor)) - faster.first_frame + 1);
+  for (int i = 0; i < frames; ++i) faster.planes.push_back(plane_of(light, (faster.first_frame + i) * factor));
+  return faster;
+}
+
 }  // namespace
 
 std::optional<Eigen::Vector3d> Plane::meet(const Ray& ray) const {
@@ -51,6 +97,10 @@ Plane Light::plane_at(double time_frames) const {
 
 std::optional<double> Light::time_of(const Eigen::Vector3d& rig_point) const {
   return std::visit([&](const auto& light) { return passing_time(light, rig_point); }, model_);
+}
+
+Light Light::sped_up(double factor) const {
+  return std::visit([&](const auto& light) { return Light(pagesweep::sped_up(light, factor)); }, model_);
 }
 
 }  // namespace pagesweep

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "pagesweep/camera/rigid3.h"
 
@@ -36,10 +37,17 @@ struct RotatingPlane {
   double angle_per_frame = 0;                            ///< [rad]
 };
 
+/// The stripe's middle, frame by frame, as a motor happened to move it: planes[k] at frame first_frame + k. Between two
+/// frames, and beyond the outermost two, distance to the plane runs evenly with time.
+struct RecordedPlanes {
+  int first_frame = 0;
+  std::vector<Plane> planes;  ///< at least two; a point in the stripe's reach is passed once
+};
+
 /// The moving sheet of light.
 class Light {
  public:
-  using Model = std::variant<TranslatingPlane, RotatingPlane>;
+  using Model = std::variant<TranslatingPlane, RotatingPlane, RecordedPlanes>;
   Light() = default;
   Light(Model model) : model_(std::move(model)) {}
 
@@ -48,6 +56,8 @@ class Light {
   Plane plane_at(double time_frames) const;
   /// The time [frames] at which the stripe's middle passes a point; nothing if it never does.
   std::optional<double> time_of(const Eigen::Vector3d& rig_point) const;
+  /// The same light as it is seen when it moves `factor` times as far from one frame to the next; frame 0 stays.
+  Light sped_up(double factor) const;
 
  private:
   Model model_;

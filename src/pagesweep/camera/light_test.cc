@@ -36,6 +36,27 @@ TEST(Light, RotatingPlanePassesItsPointsAtItsTime) {
       Light(RotatingPlane{{0, 10, 600}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), -0.25, 0.0025}));
 }
 
+Light recorded() {
+  RecordedPlanes light{-20, {}};
+  for (int i = -20; i < 230; ++i)
+    light.planes.push_back({Eigen::Vector3d(0.01, 1, 1e-3 * i).normalized(), -150 + 1.5 * i + 0.2 * std::sin(0.2 * i)});
+  return Light(light);
+}
+
+TEST(Light, RecordedPlanesPassTheirPointsAtTheirTimeAlsoBetweenFrames) {
+  expect_that_points_of_the_plane_have_its_time(recorded());
+}
+
+TEST(Light, SpedUpItIsWhereItWasAtTheFasterTime) {
+  const Light turning(RotatingPlane{{0, 10, 600}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), -0.25, 0.0025});
+  const Light moving(TranslatingPlane{Eigen::Vector3d(0.01, 1, 0.1).normalized(), -150, 1.5});
+  for (const Light& light : {turning, moving, recorded()}) {
+    const Plane slow = light.plane_at(80), fast = light.sped_up(2).plane_at(40);
+    EXPECT_LT((slow.normal - fast.normal).norm(), 1e-9);
+    EXPECT_NEAR(slow.offset, fast.offset, 1e-9);
+  }
+}
+
 TEST(Light, ALightThatStandsStillPassesNothing) {
   EXPECT_FALSE(Light(TranslatingPlane{Eigen::Vector3d::UnitY(), 0, 0}).time_of({0, 5, 0}));
 }

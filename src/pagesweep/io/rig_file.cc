@@ -126,11 +126,23 @@ RotatingPlane read_rotating_plane(const JsonReader& json) {
   return light;
 }
 
+RecordedPlanes read_recorded_planes(const JsonReader& json) {
+  RecordedPlanes light;
+  light.first_frame = json.at("first_frame").integer(-1000000, 1000000);
+  for (const JsonReader& item : json.at("planes").items())
+    light.planes.push_back({item.at("normal").unit_vector(), item.at("offset").number(-longest, longest)});
+  if (light.planes.size() < 2)
+    throw json.at("planes").error(fmt::format("expected at least 2 planes, found {}", light.planes.size()));
+  return light;
+}
+
 Light read_light(const JsonReader& json) {
   const JsonReader model = json.at("model");
+  if (model.text() == "recorded-planes") return Light(read_recorded_planes(json));
   if (model.text() == "rotating-plane") return Light(read_rotating_plane(json));
   if (model.text() != "translating-plane")
-    throw model.error(fmt::format(R"(expected "translating-plane" or "rotating-plane", found "{}")", model.text()));
+    throw model.error(fmt::format(R"(expected "translating-plane", "rotating-plane" or "recorded-planes", found "{}")",
+                                  model.text()));
   return Light(TranslatingPlane{json.at("normal").unit_vector(), json.at("offset").number(-longest, longest),
                                 not_zero(json.at("offset_per_frame"))});
 }
@@ -197,6 +209,13 @@ ordered_json to_json(const RotatingPlane& light) {
   return {{"model", "rotating-plane"},   {"axis_point", to_json(light.axis_point)},
           {"axis", to_json(light.axis)}, {"normal0", to_json(light.normal0)},
           {"angle0", light.angle0},      {"angle_per_frame", light.angle_per_frame}};
+}
+
+ordered_json to_json(const RecordedPlanes& light) {
+  ordered_json planes = ordered_json::array();
+  for (const Plane& plane : light.planes)
+    planes.push_back({{"normal", to_json(plane.normal)}, {"offset", plane.offset}});
+  return {{"model", "recorded-planes"}, {"first_frame", light.first_frame}, {"planes", planes}};
 }
 
 void require_finite(const ordered_json& json) {

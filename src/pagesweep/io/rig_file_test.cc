@@ -67,7 +67,8 @@ TEST(RigFile, KeepsEveryLightModelToTheLastBit) {
   const Eigen::Vector3d normal = some_rotation(0.4).col(1);
   const Light moving(TranslatingPlane{normal, -150, 1.5});
   const Light turning(RotatingPlane{{1, 2, 3}, some_rotation(0.4).col(0), normal, 0.1, -0.01});
-  for (const Light& light : {moving, turning}) {
+  const Light recorded(RecordedPlanes{5, {{normal, -140}, {some_rotation(0.41).col(1), -138.5}, {normal, -137}}});
+  for (const Light& light : {moving, turning, recorded}) {
     Rig rig;
     rig.cameras = {some_camera("cam1")};
     rig.light = light;
@@ -161,7 +162,7 @@ TEST(RigFile, NamesFileFieldAndWhatWasExpected) {
       {"\"pushbroom\"", "\"rotating-line\"", "scanner.angle0", "is missing"},
       {"\"model\": \"pushbroom\"", "\"model\": \"rotating-line\", \"angle0\": 0, \"angle_step\": 0",
        "scanner.angle_step", "other than 0"},
-      {"\"translating-plane\"", "\"laser\"", "light.model", "\"rotating-plane\", found \"laser\""},
+      {"\"translating-plane\"", "\"laser\"", "light.model", "\"rotating-plane\" or \"recorded-planes\", found \"laser\""},
       {"[0, 1, 0]", "[0, 2, 0]", "light.normal", "length 1, found length 2"},
       {"[0, 1, 0]", "[0, 0, 0]", "light.normal", "length 1, found length 0"},
       {"\"offset_per_frame\": 1.5", "\"offset_per_frame\": 0", "light.offset_per_frame", "other than 0"},

@@ -47,15 +47,6 @@ Scanner::Model resized(const RotatingLine& full, double factor) {
   return line;
 }
 
-Light sped_up(const Light& light, double factor) {
-  Light::Model model = light.model();
-  if (auto* plane = std::get_if<TranslatingPlane>(&model))
-    plane->offset_per_frame *= factor;
-  else
-    std::get<RotatingPlane>(model).angle_per_frame *= factor;
-  return Light(model);
-}
-
 }  // namespace
 
 Rig make_default_rig() {
@@ -90,7 +81,7 @@ Scene preview_of(Scene scene) {
     scene.rig.scanner =
         std::visit([](const auto& model) { return Scanner(resized(model, 1.0 / 3)); }, scene.rig.scanner->model());
   scene.camera.frames = (scene.camera.frames + 1) / 2;
-  scene.lamp.light = sped_up(scene.lamp.light, 2);
+  scene.lamp.light = scene.lamp.light.sped_up(2);
   scene.lamp.fwhm_mm *= 1.5;
   scene.camera.rays_per_side = 6;
   scene.scan.rays_per_side = 2;
