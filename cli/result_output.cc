@@ -29,6 +29,31 @@ std::vector<Figure> figures_of(const SensorNoise& noise, const std::string& came
       {camera, "gain", "gray values a photoelectron", noise.gain, "gray values", ""}};
 }
 
+void add_figures(std::vector<Figure>& figures, const EdgeCorrection& edges, const std::string& camera) {
+  figures.push_back({camera, "edges_before", "time values at edges of print against those around, over their sigma",
+                     edges.before, "", ""});
+  figures.push_back(
+      {camera, "edges_after", "the same after they were moved to the pixels' centres", edges.after, "", ""});
+}
+
+void add_figures(std::vector<Figure>& figures, const FusionCounts& counts, const std::string& camera) {
+  const auto add = [&](const char* name, const char* what, std::int64_t count) {
+    figures.push_back({camera, name, what, static_cast<double>(count), "points", ""});
+  };
+  add("points_fused", "points of both cameras and the sheet of light", counts.weighted);
+  add("points_by_light", "points that this camera alone measured, with the sheet of light", counts.added);
+  add("points_corrected", "matches that the sheet of light contradicted and replaced", counts.corrected);
+}
+
+std::vector<Figure> figures_of(const LightSweep& sweep) {
+  return {{"light", "speed", "speed of the stripe over the table", sweep.mm_per_frame, "mm/frame", ""},
+          {"light", "unevenness_rms", "the stripe ahead of or behind an even motion, rms", sweep.unevenness_rms_mm,
+           "mm", ""},
+          {"light", "unevenness_max", "the same, at most", sweep.unevenness_max_mm, "mm", ""},
+          {"light", "misfit", "points off the sheet of light of their time, robust standard deviation", sweep.misfit_mm,
+           "mm", ""}};
+}
+
 std::vector<CameraReport> cameras_of(const RunResult& result) {
   const Measurement& measurement = result.measurement;
   std::vector<CameraReport> cameras;
@@ -42,6 +67,8 @@ std::vector<CameraReport> cameras_of(const RunResult& result) {
       camera.times = &measurement.timing->maps[c];
       camera.figures = figures_of(measurement.timing->noise[c], camera.name);
     }
+    if (c < measurement.edges.size()) add_figures(camera.figures, measurement.edges[c], camera.name);
+    if (c < measurement.fusion.size()) add_figures(camera.figures, measurement.fusion[c], camera.name);
     cameras.push_back(std::move(camera));
   }
   return cameras;
@@ -57,6 +84,8 @@ ReportInputs inputs_of(const RunResult& result, const ConsoleProgress& progress)
     inputs.figures.push_back({"stripe", "fwhm", "duration of the stripe at one spot, at half its height",
                               timing->profile.full_width_half_maximum(), "frames", ""});
   }
+  if (const auto& sweep = result.measurement.sweep)
+    for (Figure& figure : figures_of(*sweep)) inputs.figures.push_back(std::move(figure));
   inputs.surfaces = result.surfaces;
   inputs.pages = result.pages;
   inputs.scan = result.scan;
@@ -78,7 +107,9 @@ std::string summary(const OutputFolder& output, const Verdict& verdict) {
 void add_measuring_options(std::vector<OptionValue>& values, const ScanOptions& options) {
   values.push_back({"matching", "matcher", std::string(name_of(options.matcher)), ""});
   add_options(values, "timing", options.timing);
+  values.push_back({"timing", "edges", std::string(name_of(options.edges)), ""});
   add_options(values, "matching", options.matching);
+  values.push_back({"triangulation", "fusion", options.fusion, ""});
   add_options(values, "triangulation", options.triangulation);
 }
 

@@ -14,12 +14,14 @@ struct Correspondences {
       : u(width, height, not_a_number),
         v(width, height, not_a_number),
         sigma(width, height, not_a_number),
+        slope(width, height, not_a_number),
         status(width, height, PixelStatus::not_computed) {}
   int width() const { return u.width(); }
   int height() const { return u.height(); }
 
   Image<float> u, v;   ///< [px] in the other camera's picture, on this pixel's epipolar curve
   Image<float> sigma;  ///< [px] one standard deviation along that curve
+  Image<float> slope;  ///< [frames/px] of the other camera's times along it, towards nearer points; NaN without times
   Image<PixelStatus> status;
 };
 

@@ -64,7 +64,8 @@ void apply(Image<PixelStatus>& status, Correspondences& matches) {
   matches.status.swap(status);
   for (std::size_t i = 0; i < matches.status.size(); ++i) {
     if (matches.status.data()[i] == PixelStatus::ok) continue;
-    matches.u.data()[i] = matches.v.data()[i] = matches.sigma.data()[i] = not_a_number;
+    matches.u.data()[i] = matches.v.data()[i] = not_a_number;
+    matches.sigma.data()[i] = matches.slope.data()[i] = not_a_number;
   }
 }
 

@@ -174,7 +174,7 @@ Match TimeFinder::match_at(double root, const TimeDifference& difference, float 
   const double variance = static_cast<double>(sigma) * sigma + to_.variance_at(*pixel);
   const double sigma_px = std::sqrt(variance) / std::abs(slope);
   if (!(sigma_px <= max_sigma_px_)) return Match::none(PixelStatus::ambiguous);
-  return {PixelStatus::ok, *pixel, sigma_px, root};
+  return {PixelStatus::ok, *pixel, sigma_px, root, slope};
 }
 
 void require_size(const TimeMap& map, const Camera& camera) {

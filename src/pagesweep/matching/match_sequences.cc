@@ -63,7 +63,7 @@ class SequenceFinder final : public MatchFinder {
       return is_rival(other, *best, options_.min_distinction * energy);
     });
     if (rivalled || !(best->fit.sigma_px <= options_.max_sigma_px)) return Match::none(PixelStatus::ambiguous);
-    return {PixelStatus::ok, best->fit.pixel, best->fit.sigma_px, best->fit.inverse_depth};
+    return {PixelStatus::ok, best->fit.pixel, best->fit.sigma_px, best->fit.inverse_depth, not_a_number};
   }
 
  private:

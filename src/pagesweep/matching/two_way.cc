@@ -98,6 +98,7 @@ Correspondences match_one_way(const Direction& direction, InverseDepthRange rang
         matches.u(x, y) = static_cast<float>(match.pixel.x());
         matches.v(x, y) = static_cast<float>(match.pixel.y());
         matches.sigma(x, y) = static_cast<float>(match.sigma_px);
+        matches.slope(x, y) = static_cast<float>(match.slope);
         expected = match.inverse_depth;
       }
     });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <memory>
 
 #include "pagesweep/matching/epipolar_curve.h"
@@ -12,11 +13,16 @@ namespace pagesweep {
 /// The place in the other camera that belongs to one pixel, or why there is none.
 struct Match {
   PixelStatus status = PixelStatus::no_match;
-  Eigen::Vector2d pixel;     ///< [px]
-  double sigma_px = 0;       ///< along the curve
-  double inverse_depth = 0;  ///< [1/mm]
+  Eigen::Vector2d pixel;                                    ///< [px]
+  double sigma_px = 0;                                      ///< along the curve
+  double inverse_depth = 0;                                 ///< [1/mm]
+  double slope = std::numeric_limits<double>::quiet_NaN();  ///< [frames/px] see Correspondences
 
-  static Match none(PixelStatus why) { return {why, {}, 0, 0}; }
+  static Match none(PixelStatus why) {
+    Match match;
+    match.status = why;
+    return match;
+  }
 };
 
 /// Finds matches one after the other, from left to right in a row. It holds scratch memory: one a thread.

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "pagesweep/base/error.h"
+#include "pagesweep/footprint/weigh_footprints.h"
 #include "pagesweep/matching/match_sequences.h"
 #include "pagesweep/timing/pairwise.h"
 #include "pagesweep/triangulation/section_light.h"
@@ -51,6 +52,74 @@ MatchPair match(const std::vector<Frames>& frames, const Measurement& measuremen
   return matches;
 }
 
+/// The stereo points calibrate the sheet of light, which then takes part in them.
+void fuse(const MatchPair& matches, const ScanOptions& options, Measurement& measurement) {
+  const auto& cameras = measurement.cameras;
+  const auto& times = measurement.timing->maps;
+  measurement.sweep = calibrate_light(measurement.points, times);
+  measurement.fusion.clear();
+  if (!measurement.sweep) return;
+  const Light& light = measurement.sweep->light;
+  measurement.fusion.push_back(fuse_light(measurement.points[0], matches.from_first, times[0], cameras[0], cameras[1],
+                                          light, options.triangulation));
+  measurement.fusion.push_back(fuse_light(measurement.points[1], matches.from_second, times[1], cameras[1], cameras[0],
+                                          light, options.triangulation));
+}
+
+/// Points from the time maps (from the frames, for the sequence matcher), in place of any that are there.
+void find_points(const std::vector<Frames>& frames, const Rig& rig, const ScanOptions& options,
+                 Measurement& measurement, Progress& progress) {
+  measurement.points.clear();
+  const auto& cameras = measurement.cameras;
+  if (options.matcher == Matcher::light_section) {
+    for (std::size_t c = 0; c < cameras.size(); ++c)
+      measurement.points.push_back(
+          section_light(measurement.timing->maps[c], cameras[c], *rig.light, options.triangulation));
+    return;
+  }
+  const MatchPair matches = match(frames, measurement, options, progress);
+  const auto intensity = [&](std::size_t c) {
+    return measurement.timing ? measurement.timing->maps[c].amplitude : brightest(frames[c]);
+  };
+  progress.begin("triangulating");
+  measurement.points.push_back(
+      triangulate(matches.from_first, intensity(0), cameras[0], cameras[1], options.triangulation));
+  measurement.points.push_back(
+      triangulate(matches.from_second, intensity(1), cameras[1], cameras[0], options.triangulation));
+  if (options.fusion && measurement.timing) fuse(matches, options, measurement);
+}
+
+/// Each camera's times, moved to the pixels' centres by what its own amplitudes tell of the print.
+void correct_by_amplitude(const std::vector<TimeMap>& seen, Measurement& measurement) {
+  measurement.edges.clear();
+  for (std::size_t c = 0; c < seen.size(); ++c) {
+    const SpotOffsets offsets = offsets_from_amplitude(seen[c]);
+    measurement.edges.push_back(fit_edges(seen[c], offsets));
+    correct_edges(measurement.timing->maps[c], offsets, measurement.edges[c]);
+  }
+}
+
+/// Likewise by what the scan tells, where the first measurement can look it up, and only if it explains the times
+/// better: a scan that does not lie where the rig says is no witness.
+void correct_by_scan(const std::vector<TimeMap>& seen, const Scanner& scanner, const Picture& scan,
+                     Measurement& measurement) {
+  for (std::size_t c = 0; c < seen.size(); ++c) {
+    const double spot_variance_px2 = measurement.edges[c].gain;
+    if (!(spot_variance_px2 > 0)) continue;
+    const SpotOffsets offsets = weigh_footprints(measurement.points[c], scanner, scan, spot_variance_px2);
+    const EdgeCorrection correction = fit_edges(seen[c], offsets);
+    if (!(correction.after < measurement.edges[c].after)) continue;
+    TimeMap& times = measurement.timing->maps[c];
+    for (std::size_t i = 0; i < times.time.size(); ++i) {
+      if (!std::isfinite(offsets.dx.data()[i])) continue;
+      times.time.data()[i] = seen[c].time.data()[i];
+      times.sigma.data()[i] = seen[c].sigma.data()[i];
+    }
+    correct_edges(times, offsets, correction);
+    measurement.edges[c] = correction;
+  }
+}
+
 /// The direction, in the rig's xy plane, in which the scan's columns count: the reader's right.
 double reading_direction(const Scanner& scanner) {
   const auto ray = scanner.ray({0.5 * (scanner.width() - 1), 0.5 * (scanner.height() - 1)});
@@ -65,7 +134,8 @@ double reading_direction(const Scanner& scanner) {
 
 }  // namespace
 
-Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& options, Progress& progress) {
+Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& options, Progress& progress,
+                        const Picture* scan) {
   Measurement measurement;
   measurement.cameras = cameras_of(source, rig, options.matcher);
   const std::vector<Frames> frames = read_all(source, progress);
@@ -73,24 +143,19 @@ Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& 
     measurement.dropped_frames.push_back(sequence.dropped());
     measurement.clipped_frames.push_back(count_clipped(sequence));
   }
-
-  if (options.matcher != Matcher::sequence) measurement.timing = estimate_times(frames, options.timing, progress);
-
-  if (options.matcher == Matcher::light_section) {
-    for (std::size_t c = 0; c < frames.size(); ++c)
-      measurement.points.push_back(
-          section_light(measurement.timing->maps[c], measurement.cameras[c], *rig.light, options.triangulation));
+  if (options.matcher == Matcher::sequence) {
+    find_points(frames, rig, options, measurement, progress);
     return measurement;
   }
-
-  const MatchPair matches = match(frames, measurement, options, progress);
-  const auto intensity = [&](std::size_t c) {
-    return measurement.timing ? measurement.timing->maps[c].amplitude : brightest(frames[c]);
-  };
-  const auto& [first, second] = std::tie(measurement.cameras[0], measurement.cameras[1]);
-  progress.begin("triangulating");
-  measurement.points.push_back(triangulate(matches.from_first, intensity(0), first, second, options.triangulation));
-  measurement.points.push_back(triangulate(matches.from_second, intensity(1), second, first, options.triangulation));
+  measurement.timing = estimate_times(frames, options.timing, progress);
+  const std::vector<TimeMap> seen = measurement.timing->maps;
+  if (options.edges != EdgeWitness::none) correct_by_amplitude(seen, measurement);
+  find_points(frames, rig, options, measurement, progress);
+  if (options.edges == EdgeWitness::scan && scan && rig.scanner) {
+    progress.begin("looking up the print in the scan");
+    correct_by_scan(seen, *rig.scanner, *scan, measurement);
+    find_points(frames, rig, options, measurement, progress);
+  }
   return measurement;
 }
 
@@ -114,7 +179,7 @@ Scan flatten(Measurement measurement, const Picture& picture, const Rig& rig, co
 
 Scan scan_page(FrameSource& frames, const Picture& scan, const Rig& rig, const ScanOptions& options,
                Progress& progress) {
-  return flatten(reconstruct(frames, rig, options, progress), scan, rig, options, progress);
+  return flatten(reconstruct(frames, rig, options, progress, &scan), scan, rig, options, progress);
 }
 
 }  // namespace pagesweep

@@ -15,7 +15,10 @@
 #include "pagesweep/dewarping/dewarp.h"
 #include "pagesweep/matching/match_epipolar.h"
 #include "pagesweep/surfacing/fit_surface.h"
+#include "pagesweep/timing/edge_correction.h"
 #include "pagesweep/timing/estimate_times.h"
+#include "pagesweep/triangulation/calibrate_light.h"
+#include "pagesweep/triangulation/fuse_light.h"
 #include "pagesweep/triangulation/triangulate.h"
 
 namespace pagesweep {
@@ -28,9 +31,20 @@ enum class Matcher {
 };
 constexpr auto names_of(Matcher) { return std::array<std::string_view, 3>{"time", "sequence", "light-section"}; }
 
+/// What tells where in its spot of paper a pixel's light came from. Over an edge of print the time value belongs to
+/// the bright side (docs/derivations/edges.md).
+enum class EdgeWitness {
+  none,       ///< nothing: time values stay as they are
+  amplitude,  ///< the camera's own amplitudes
+  scan,       ///< the scan, seen through a first measurement; the amplitudes where there is none
+};
+constexpr auto names_of(EdgeWitness) { return std::array<std::string_view, 3>{"none", "amplitude", "scan"}; }
+
 /// The options of all stations.
 struct ScanOptions {
   Matcher matcher = Matcher::time;
+  EdgeWitness edges = EdgeWitness::scan;
+  bool fusion = true;
   TimingOptions timing;
   MatchOptions matching;
   TriangulationOptions triangulation;
@@ -42,7 +56,10 @@ struct ScanOptions {
   void describe_measurement(Visitor&& visit) {
     visit("matcher", matcher, "", "what tells which pixels of the two cameras see the same spot");
     timing.describe(visit);
+    visit("edges", edges, "", "what tells where the light of a pixel at an edge of print came from");
     matching.describe(visit);
+    visit("fusion", fusion, "",
+          "let the sheet of light, calibrated by the stereo points of the scan itself, have its say in every point");
     triangulation.describe(visit);
   }
   template <class Visitor>
@@ -57,7 +74,10 @@ struct Measurement {
   std::vector<Camera> cameras;
   std::vector<int> dropped_frames;
   std::vector<Image<std::uint8_t>> clipped_frames;  ///< in how many frames each pixel was clipped; empty: not known
-  std::optional<Timing> timing;  ///< time maps, stripe profile, sensor noise; none for the sequence matcher
+  std::optional<Timing> timing;       ///< time maps, stripe profile, sensor noise; none for the sequence matcher
+  std::vector<EdgeCorrection> edges;  ///< of the time maps; empty: not corrected
+  std::optional<LightSweep> sweep;    ///< the sheet of light as the stereo points show it
+  std::vector<FusionCounts> fusion;   ///< what it did to the points; empty: it had no say
   std::vector<PointMap> points;
 };
 
@@ -69,9 +89,10 @@ struct Scan {
 };
 
 /// The first half of the way: frames to points.
+/// \param scan  the scanner's picture, if there is one: it tells better than the frames what is printed where
 /// \throws Error  (bad_input) if the rig lacks a camera of the source, or what the matcher needs
 Measurement reconstruct(FrameSource& frames, const Rig& rig, const ScanOptions& options = {},
-                        Progress& progress = no_progress());
+                        Progress& progress = no_progress(), const Picture* scan = nullptr);
 
 /// The second half: points to flat pages.
 /// \throws Error  (bad_input) if the rig has no scanner or the picture is not of its size; (no_result) if no page is

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/triangulation/calibrate_light.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "pagesweep/base/b_spline.h"
+
+namespace pagesweep {
+namespace {
+
+struct Sighting {
+  Eigen::Vector3d point;  ///< [mm] rig frame, later along (e, f, z)
+  double time;            ///< [frames]
+  double weight;          ///< [1/mm^2]
+};
+
+/// Every n-th pixel, so that about 300,000 take part: more would not change the planes by a micrometre.
+std::vector<Sighting> collect(std::span<const PointMap> points, std::span<const TimeMap> times) {
+  std::size_t pixels = 0;
+  for (std::size_t c = 0; c < points.size(); ++c) {
+    if (points[c].width() != times[c].width() || points[c].height() != times[c].height())
+      throw std::invalid_argument("calibrate_light: points and times differ in size");
+    pixels += points[c].x.size();
+  }
+  const std::size_t stride = std::max<std::size_t>(1, pixels / 300000);
+  std::vector<Sighting> sightings;
+  for (std::size_t c = 0; c < points.size(); ++c)
+    for (std::size_t i = 0; i < points[c].x.size(); i += stride) {
+      const float sigma = points[c].sigma.data()[i];
+      if (points[c].status.data()[i] != PixelStatus::ok || times[c].status.data()[i] != PixelStatus::ok || !(sigma > 0))
+        continue;
+      sightings.push_back({{points[c].x.data()[i], points[c].y.data()[i], points[c].z.data()[i]},
+                           times[c].time.data()[i],
+                           1 / (static_cast<double>(sigma) * sigma)});
+    }
+  return sightings;
+}
+
+/// Direction over the table in which time grows, from a straight line fit of time to place.
+Eigen::Vector3d sweep_direction(const std::vector<Sighting>& sightings) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const Sighting& s : sightings) {
+    const Eigen::Vector3d row(s.point.x(), s.point.y(), 1);
+    normal += row * row.transpose();
+    right += row * s.time;
+  }
+  const Eigen::Vector3d slope = normal.ldlt().solve(right);
+  return Eigen::Vector3d(slope.x(), slope.y(), 0).normalized();
+}
+
+/// e . X = d(t) - (a0 + a1 s) f . X - (b0 + b1 s) z, with s the time from -1 to 1.
+class SweepFit {
+ public:
+  SweepFit(std::vector<Sighting> sightings, double begin, double end, const Eigen::Vector3d& along)
+      : sightings_(std::move(sightings)), begin_(begin), end_(end), splines_(breaks(begin, end)), along_(along) {
+    const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(along_);
+    for (Sighting& s : sightings_) s.point = {along_.dot(s.point), across.dot(s.point), s.point.z()};
+  }
+
+  /// Robust fit: Tukey's weights on the residual over a scale from its median.
+  void solve() {
+    std::vector<double> robust(sightings_.size(), 1.0);
+    for (int pass = 0; pass < 4; ++pass) {
+      solve(robust);
+      scale_ = 1.4826 * median_residual();
+      const double limit = 4.7 * std::max(scale_, 1e-6);
+      for (std::size_t k = 0; k < sightings_.size(); ++k) {
+        const double part = residual(sightings_[k]) / limit;
+        robust[k] = std::abs(part) < 1 ? std::pow(1 - part * part, 2) : 0;
+      }
+    }
+    used_ = std::count_if(robust.begin(), robust.end(), [](double w) { return w > 0; });
+  }
+
+  LightSweep describe() const {
+    LightSweep sweep;
+    const int first = static_cast<int>(std::floor(begin_)), last = static_cast<int>(std::ceil(end_));
+    RecordedPlanes planes{first, {}};
+    std::vector<double> ways;
+    for (int i = first; i <= last; ++i) {
+      planes.planes.push_back(plane_at(i));
+      ways.push_back(way_at(i));
+    }
+    const auto count = static_cast<double>(ways.size());
+    double st = 0, stt = 0, sw = 0, stw = 0;
+    for (std::size_t i = 0; i < ways.size(); ++i) {
+      const auto t = static_cast<double>(i);
+      st += t;
+      stt += t * t;
+      sw += ways[i];
+      stw += t * ways[i];
+    }
+    sweep.mm_per_frame = (count * stw - st * sw) / (count * stt - st * st);
+    const double start = (sw - sweep.mm_per_frame * st) / count;
+    double squares = 0;
+    for (std::size_t i = 0; i < ways.size(); ++i) {
+      const double off = ways[i] - start - sweep.mm_per_frame * static_cast<double>(i);
+      squares += off * off;
+      sweep.unevenness_max_mm = std::max(sweep.unevenness_max_mm, std::abs(off));
+    }
+    sweep.unevenness_rms_mm = std::sqrt(squares / count);
+    sweep.misfit_mm = scale_;
+    sweep.points = used_;
+    sweep.light = Light(std::move(planes));
+    return sweep;
+  }
+
+ private:
+  static std::vector<double> breaks(double begin, double end) {
+    const int intervals = std::max(2, static_cast<int>((end - begin) / 4));
+    std::vector<double> values;
+    for (int i = 0; i <= intervals; ++i) values.push_back(begin + i * (end - begin) / intervals);
+    return values;
+  }
+  double relative(double time) const { return 2 * (time - begin_) / (end_ - begin_) - 1; }
+  int spline_count() const { return splines_.size(); }
+
+  void solve(const std::vector<double>& robust);
+  double way_at(double time) const {
+    const BSplineRow row = splines_.at(time);
+    double way = 0;
+    for (int k = 0; k < 4; ++k) way += row.value[static_cast<std::size_t>(k)] * unknowns_[4 + row.first + k];
+    return way;
+  }
+  double residual(const Sighting& s) const {
+    const double r = relative(s.time);
+    return s.point.x() + (unknowns_[0] + r * unknowns_[1]) * s.point.y() +
+           (unknowns_[2] + r * unknowns_[3]) * s.point.z() - way_at(s.time);
+  }
+  double median_residual() const {
+    std::vector<double> misses;
+    for (const Sighting& s : sightings_) misses.push_back(std::abs(residual(s)));
+    const auto middle = misses.begin() + static_cast<std::ptrdiff_t>(misses.size() / 2);
+    std::nth_element(misses.begin(), middle, misses.end());
+    return *middle;
+  }
+  Plane plane_at(double time) const {
+    const double r = relative(time);
+    const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(along_);
+    const Eigen::Vector3d normal = along_ + (unknowns_[0] + r * unknowns_[1]) * across +
+                                   (unknowns_[2] + r * unknowns_[3]) * Eigen::Vector3d::UnitZ();
+    return {normal.normalized(), way_at(time) / normal.norm()};
+  }
+
+  std::vector<Sighting> sightings_;
+  double begin_, end_;
+  CubicBSplines splines_;
+  Eigen::Vector3d along_;
+  Eigen::VectorXd unknowns_;  ///< a0, a1, b0, b1, spline coefficients of d
+  double scale_ = 0;          ///< [mm]
+  std::int64_t used_ = 0;
+};
+
+void SweepFit::solve(const std::vector<double>& robust) {
+  const int count = 4 + spline_count();
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(count, count);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
+  for (std::size_t k = 0; k < sightings_.size(); ++k) {
+    const Sighting& s = sightings_[k];
+    const double weight = robust[k] * s.weight, r = relative(s.time);
+    if (weight == 0) continue;
+    const BSplineRow row = splines_.at(s.time);
+    std::array<double, 8> value{-s.point.y(), -r * s.point.y(), -s.point.z(), -r * s.point.z()};
+    std::array<int, 8> place{0, 1, 2, 3};
+    for (std::size_t j = 0; j < 4; ++j) {
+      value[4 + j] = row.value[j];
+      place[4 + j] = 4 + row.first + static_cast<int>(j);
+    }
+    for (std::size_t i = 0; i < 8; ++i) {
+      right[place[i]] += weight * value[i] * s.point.x();
+      for (std::size_t j = 0; j <= i; ++j) normal(place[i], place[j]) += weight * value[i] * value[j];
+    }
+  }
+  // A slope of about 1 is as good as known beforehand; frames without points take their neighbours' speed.
+  for (int i = 0; i < 4; ++i) normal(i, i) += 10;
+  const std::vector<double> weights(splines_.breaks().size() - 1, 1.0);
+  normal.bottomRightCorner(count - 4, count - 4) += splines_.bending(weights);
+  unknowns_ = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
+}
+
+}  // namespace
+
+std::optional<LightSweep> calibrate_light(std::span<const PointMap> points, std::span<const TimeMap> times) {
+  if (points.size() != times.size()) throw std::invalid_argument("calibrate_light: as many points as times, please");
+  std::vector<Sighting> sightings = collect(points, times);
+  if (sightings.size() < 1000) return std::nullopt;
+  const auto [begin, end] = std::ranges::minmax(sightings, {}, &Sighting::time);
+  if (!(end.time - begin.time >= 10)) return std::nullopt;
+  const Eigen::Vector3d along = sweep_direction(sightings);
+  SweepFit fit(sightings, begin.time, end.time, along);
+  fit.solve();
+  return fit.describe();
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/triangulation/fuse_light.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "pagesweep/base/parallel.h"
+#include "pagesweep/camera/ray_table.h"
+#include "pagesweep/triangulation/light_section.h"
+#include "pagesweep/triangulation/normals.h"
+
+namespace pagesweep {
+namespace {
+
+/// By how much the times of a camera's pixels are late against the sheet of light at their stereo points. It takes up
+/// what the sheet's model misses, and light that comes from a facing page. A tile's value is the weighted median of its
+/// pixels; between the tiles' middles they are interpolated, each with the weight of its pixels: what dark
+/// pixels beside bright ones seem to say is the bright ones' stray light.
+class Lateness {
+ public:
+  Lateness(const PointMap& points, const TimeMap& times, const Light& light)
+      : tiles_((times.width() + tile - 1) / tile, (times.height() + tile - 1) / tile) {
+    parallel_rows(tiles_.height(), [&](int row) {
+      std::vector<Voice> voices;
+      for (int column = 0; column < tiles_.width(); ++column) {
+        gather(points, times, light, column, row, voices);
+        tiles_(column, row) = weighted_median(voices);
+      }
+    });
+    for (int ring = 0; ring < reach; ++ring) spread();
+  }
+
+  /// [frames]; NaN far from all stereo points.
+  double at(int x, int y) const {
+    const double u = std::clamp((x + 0.5) / tile - 0.5, 0.0, tiles_.width() - 1.0);
+    const double v = std::clamp((y + 0.5) / tile - 0.5, 0.0, tiles_.height() - 1.0);
+    const int left = static_cast<int>(u), top = static_cast<int>(v);
+    const int right = std::min(left + 1, tiles_.width() - 1), bottom = std::min(top + 1, tiles_.height() - 1);
+    const double a = u - left, b = v - top;
+    double sum = 0, weights = 0;
+    const auto add = [&](int column, int row, double near) {
+      const Voice& voice = tiles_(column, row);
+      const double weight = (near + 1e-6) * voice.weight;
+      sum += weight * voice.late;
+      weights += weight;
+    };
+    add(left, top, (1 - a) * (1 - b));
+    add(right, top, a * (1 - b));
+    add(left, bottom, (1 - a) * b);
+    add(right, bottom, a * b);
+    return sum / weights;
+  }
+
+ private:
+  static constexpr int tile = 8;    // [px]
+  static constexpr int reach = 12;  // [tiles] from the nearest stereo points
+
+  struct Voice {
+    float late = 0;    ///< [frames]
+    float weight = 0;  ///< [1/frames^2]
+  };
+
+  static void gather(const PointMap& points, const TimeMap& times, const Light& light, int column, int row,
+                     std::vector<Voice>& voices) {
+    voices.clear();
+    const int right = std::min((column + 1) * tile, times.width()), bottom = std::min((row + 1) * tile, times.height());
+    for (int y = row * tile; y < bottom; ++y)
+      for (int x = column * tile; x < right; ++x) {
+        if (points.status(x, y) != PixelStatus::ok) continue;
+        const auto time = light.time_of({points.x(x, y), points.y(x, y), points.z(x, y)});
+        if (time)
+          voices.push_back({static_cast<float>(times.time(x, y) - *time), 1 / (times.sigma(x, y) * times.sigma(x, y))});
+      }
+  }
+
+  static Voice weighted_median(std::vector<Voice>& voices) {
+    if (voices.size() < 4) return {};
+    std::ranges::sort(voices, {}, &Voice::late);
+    float all = 0, below = 0;
+    for (const Voice& voice : voices) all += voice.weight;
+    for (const Voice& voice : voices)
+      if ((below += voice.weight) >= 0.5f * all) return {voice.late, all};
+    return {};
+  }
+
+  /// Tiles without stereo points take what those around say, with little weight.
+  void spread() {
+    const Image<Voice> before = tiles_;
+    for (int row = 0; row < tiles_.height(); ++row)
+      for (int column = 0; column < tiles_.width(); ++column) {
+        if (before(column, row).weight > 0) continue;
+        Voice sum;
+        for (int j = -1; j <= 1; ++j)
+          for (int i = -1; i <= 1; ++i) {
+            if (!before.contains(column + i, row + j)) continue;
+            const Voice& voice = before(column + i, row + j);
+            sum.late += voice.weight * voice.late;
+            sum.weight += voice.weight;
+          }
+        if (sum.weight > 0) tiles_(column, row) = {sum.late / sum.weight, 0.01f * sum.weight};
+      }
+  }
+
+  Image<Voice> tiles_;
+};
+
+/// A distance along a viewing ray and its variance.
+struct Estimate {
+  double distance_mm, variance_mm2;
+};
+
+/// The best linear mean of two estimates of one distance whose errors have that covariance (Gauss and Markov).
+Estimate weigh(const Estimate& a, const Estimate& b, double covariance) {
+  const double variance = a.variance_mm2 + b.variance_mm2 - 2 * covariance;
+  const double weight = std::clamp((a.variance_mm2 - covariance) / variance, 0.0, 1.0);
+  const double rest = 1 - weight;
+  return {rest * a.distance_mm + weight * b.distance_mm,
+          rest * rest * a.variance_mm2 + weight * weight * b.variance_mm2 + 2 * rest * weight * covariance};
+}
+
+/// Whether a pixel without a stereo point may be measured by its time alone.
+bool may_be_sectioned(PixelStatus status) {
+  switch (status) {
+    case PixelStatus::outside_view:
+    case PixelStatus::no_match:
+    case PixelStatus::ambiguous:
+    case PixelStatus::inconsistent:
+    case PixelStatus::rays_miss:
+    case PixelStatus::off_surface:
+      return true;
+    default:
+      return false;
+  }
+}
+
+class Fusion {
+ public:
+  Fusion(const PointMap& points, const Correspondences& matches, const TimeMap& times, const Camera& camera,
+         const Camera& to, const Light& light, const TriangulationOptions& options)
+      : matches_(matches),
+        times_(times),
+        camera_(camera),
+        to_(to),
+        light_(light),
+        options_(options),
+        rays_(camera),
+        lateness_(points, times, light) {}
+
+  void put(PointMap& points, int x, int y, FusionCounts& counts) const {
+    const bool matched = points.status(x, y) == PixelStatus::ok;
+    if (times_.status(x, y) != PixelStatus::ok || !(matched || may_be_sectioned(points.status(x, y)))) return;
+    const Eigen::Vector3d direction = rig_from_cam_ * rays_.direction(x, y).homogeneous();
+    const Ray ray{center_, direction.normalized()};
+    const double late = lateness_.at(x, y);
+    if (!std::isfinite(late)) return;
+    const LightSection met = section(light_, ray, times_.time(x, y) - late);
+    if (!(met.distance_mm > 0 && std::isfinite(met.distance_mm))) return;
+    const Estimate sheet{met.distance_mm, std::pow(times_.sigma(x, y) * met.mm_per_frame, 2)};
+    const double depth = sheet.distance_mm / direction.norm();
+    // Where the sheet alone decides, it must know the distance better than half of what a pixel sees: at a step in
+    // depth the pixel's time is that of neither surface.
+    const bool decides = sheet.variance_mm2 < std::pow(0.5 * depth / camera_.fx, 2);
+    if (matched) return fuse(points, x, y, ray, met, sheet, decides, counts);
+    if (!decides || depth < options_.near_mm || (options_.far_mm > 0 && depth > options_.far_mm)) return;
+    ++counts.added;
+    set(points, x, y, ray, sheet);
+  }
+
+  const RayTable& rays() const { return rays_; }
+
+ private:
+  void fuse(PointMap& points, int x, int y, const Ray& ray, const LightSection& met, const Estimate& sheet,
+            bool sheet_decides, FusionCounts& counts) const {
+    const Eigen::Vector3d point(points.x(x, y), points.y(x, y), points.z(x, y));
+    const Estimate stereo{(point - ray.origin).dot(ray.direction), std::pow(points.sigma(x, y), 2)};
+    // The pixel's time being late by e moves the stereo point by e / (d time_2 / d distance), the other by its speed e.
+    const double pixels_per_mm = (to_.project_jacobian(point) * ray.direction).norm();
+    const double stereo_mm_per_frame = -1 / (matches_.slope(x, y) * pixels_per_mm);
+    const double covariance = std::pow(times_.sigma(x, y), 2) * met.mm_per_frame * stereo_mm_per_frame;
+    const double difference_variance = stereo.variance_mm2 + sheet.variance_mm2 - 2 * covariance;
+    if (!(difference_variance > 0)) return;
+    if (std::abs(sheet.distance_mm - stereo.distance_mm) > 6 * std::sqrt(difference_variance)) {
+      if (!sheet_decides) return reject(points, x, y);
+      ++counts.corrected;
+      return set(points, x, y, ray, sheet);
+    }
+    ++counts.weighted;
+    set(points, x, y, ray, weigh(stereo, sheet, covariance));
+  }
+
+  static void reject(PointMap& points, int x, int y) {
+    points.x(x, y) = points.y(x, y) = points.z(x, y) = points.sigma(x, y) = not_a_number;
+    points.status(x, y) = PixelStatus::off_surface;
+  }
+
+  static void set(PointMap& points, int x, int y, const Ray& ray, const Estimate& estimate) {
+    const Eigen::Vector3f point = ray.at(estimate.distance_mm).cast<float>();
+    points.x(x, y) = point.x();
+    points.y(x, y) = point.y();
+    points.z(x, y) = point.z();
+    points.sigma(x, y) = static_cast<float>(std::sqrt(estimate.variance_mm2));
+    points.status(x, y) = PixelStatus::ok;
+  }
+
+  const Correspondences& matches_;
+  const TimeMap& times_;
+  const Camera& camera_;
+  const Camera& to_;
+  const Light& light_;
+  const TriangulationOptions& options_;
+  const RayTable rays_;
+  const Lateness lateness_;
+  const Eigen::Vector3d center_ = camera_.center();
+  const Eigen::Matrix3d rig_from_cam_ = camera_.cam_from_rig.rotation.transpose();
+};
+
+}  // namespace
+
+FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const TimeMap& times, const Camera& camera,
+                        const Camera& to, const Light& light, const TriangulationOptions& options) {
+  const auto fits = [&](int width, int height) { return width == camera.width && height == camera.height; };
+  if (!fits(points.width(), points.height()) || !fits(matches.width(), matches.height()) ||
+      !fits(times.width(), times.height()))
+    throw std::invalid_argument("fuse_light: points, matches or times are not of the camera's size");
+  const Fusion fusion(points, matches, times, camera, to, light, options);
+  std::vector<FusionCounts> rows(static_cast<std::size_t>(camera.height));
+  parallel_rows(camera.height, [&](int y) {
+    for (int x = 0; x < camera.width; ++x) fusion.put(points, x, y, rows[static_cast<std::size_t>(y)]);
+  });
+  fit_normals(points, camera, fusion.rays(), options.normal_radius_px);
+  FusionCounts all;
+  for (const FusionCounts& row : rows) {
+    all.weighted += row.weighted;
+    all.corrected += row.corrected;
+    all.added += row.added;
+  }
+  return all;
+}
+
+}  // namespace pagesweep
