@@ -66,4 +66,19 @@ std::pair<float, bool> Neighbourhood::median_miss(const LocalPlane& plane) {
   return {*middle, *std::max_element(middle, misses_.end()) > 3 * *middle};
 }
 
+bool is_one_surface(const LocalPlane& plane, const Image<float>& values, const Image<float>& sigmas, int x, int y,
+                    int radius) {
+  const float half_pixel = 0.5f * std::hypot(plane.across, plane.down), here = values(x, y);
+  const int top = std::max(0, y - radius), bottom = std::min(values.height() - 1, y + radius);
+  const int left = std::max(0, x - radius), right = std::min(values.width() - 1, x + radius);
+  for (int row = top; row <= bottom; ++row)
+    for (int column = left; column <= right; ++column) {
+      const float value = values(column, row);
+      if (!std::isfinite(value)) continue;
+      const float miss = value - here - plane.at(static_cast<float>(column - x), static_cast<float>(row - y));
+      if (std::abs(miss) > half_pixel + 6 * sigmas(column, row)) return false;
+    }
+  return true;
+}
+
 }  // namespace pagesweep

@@ -40,4 +40,10 @@ class Neighbourhood {
   std::vector<float> i_, j_, values_, misses_;
 };
 
+/// Whether the plane, fitted around (x, y), is that of one surface: every finite value in the window keeps to it
+/// within six of its standard deviations and half of what the plane changes by in a pixel, which is as much as print
+/// under a pixel shifts a value.
+bool is_one_surface(const LocalPlane& plane, const Image<float>& values, const Image<float>& sigmas, int x, int y,
+                    int radius);
+
 }  // namespace pagesweep

@@ -2,6 +2,7 @@
 #include "pagesweep/matching/match_epipolar.h"
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -77,46 +78,76 @@ std::optional<double> follow(const TimeDifference& difference, double expected, 
   return solve(difference, {expected, far_end, here, at_far_end}, step);
 }
 
+/// Median amplitude of a camera's pixels; 1 if there are none.
+double usual_amplitude(const TimeMap& map) {
+  std::vector<float> amplitudes;
+  for (std::size_t i = 0; i < map.status.size(); i += 7)
+    if (map.status.data()[i] == PixelStatus::ok && map.amplitude.data()[i] > 0)
+      amplitudes.push_back(map.amplitude.data()[i]);
+  if (amplitudes.empty()) return 1;
+  const auto middle = amplitudes.begin() + static_cast<std::ptrdiff_t>(amplitudes.size() / 2);
+  std::nth_element(amplitudes.begin(), middle, amplitudes.end());
+  return *middle;
+}
+
+/// A camera's times as the other one's pixels look for theirs in it.
+struct SearchedMap {
+  const TimeField* field;
+  double brightness;    ///< of this camera's pixels over those of the camera that searches
+  double max_sigma_px;  ///< of a match
+};
+
 /// Finds equal times along epipolar curves.
 class TimeFinder final : public MatchFinder {
  public:
-  TimeFinder(const TimeMap& from, const TimeField& to, double max_sigma_px)
-      : from_(from), to_(to), max_sigma_px_(max_sigma_px) {}
+  TimeFinder(const TimeMap& from, const SearchedMap& to) : from_(from), to_(to) {}
 
   Match find(int x, int y, const EpipolarCurve& curve, double expected) override {
-    const TimeDifference difference{&to_, &curve, from_.time(x, y)};
+    const Wanted wanted{{to_.field, &curve, from_.time(x, y)}, from_.sigma(x, y), from_.amplitude(x, y)};
     if (curve.contains(expected))
-      if (const auto root = follow(difference, expected, 1 / curve.speed(expected)))
-        return match_at(*root, difference, from_.sigma(x, y));
-    return search(difference, expected, from_.sigma(x, y));
+      if (const auto root = follow(wanted.difference, expected, 1 / curve.speed(expected)))
+        if (contrast(*root, wanted) < suspicious) return match_at(*root, wanted);
+    return search(wanted, expected);
   }
 
  private:
+  /// A spot of paper is about as bright in both cameras. Light that strays into a dark pixel beside bright paper has
+  /// times as well, but not the paper's amplitude: a match of this contrast is looked at twice, of that one refused.
+  static constexpr double suspicious = 4, impossible = 8;
+
+  struct Wanted {
+    TimeDifference difference;
+    float sigma, amplitude;
+  };
+
+  /// Ratio of the amplitudes of a pixel and of its match, whichever is larger.
+  double contrast(double root, const Wanted& wanted) const {
+    const auto pixel = wanted.difference.curve->at(root);
+    const double ratio = pixel ? to_.field->amplitude_at(*pixel) / (to_.brightness * wanted.amplitude) : 1;
+    return ratio > 0 ? std::max(ratio, 1 / ratio) : 1;
+  }
+
   /// Looks along the whole curve.
-  Match search(const TimeDifference& difference, double expected, float sigma);
-  Match match_at(double root, const TimeDifference& difference, float sigma) const;
+  Match search(const Wanted& wanted, double expected);
+  Match match_at(double root, const Wanted& wanted) const;
+  void find_roots(const Wanted& wanted);
 
   const TimeMap& from_;
-  const TimeField& to_;
-  double max_sigma_px_;
+  SearchedMap to_;
   CurveSamples samples_;
   std::vector<double> roots_;
 };
 
 class TimeMatcher final : public Matcher {
  public:
-  TimeMatcher(const TimeMap& from, const TimeField& to, double max_sigma_px)
-      : from_(from), to_(to), max_sigma_px_(max_sigma_px) {}
+  TimeMatcher(const TimeMap& from, const SearchedMap& to) : from_(from), to_(to) {}
 
   PixelStatus status_of(int x, int y) const override { return from_.status(x, y); }
-  std::unique_ptr<MatchFinder> make_finder() const override {
-    return std::make_unique<TimeFinder>(from_, to_, max_sigma_px_);
-  }
+  std::unique_ptr<MatchFinder> make_finder() const override { return std::make_unique<TimeFinder>(from_, to_); }
 
  private:
   const TimeMap& from_;
-  const TimeField& to_;
-  double max_sigma_px_;
+  SearchedMap to_;
 };
 
 /// Which of several roots belongs to the pixel: the one that continues the left neighbour's surface, if the others are
@@ -137,16 +168,14 @@ std::optional<double> choose(const std::vector<double>& roots, double expected, 
   return clear ? std::optional(nearest) : std::nullopt;
 }
 
-Match TimeFinder::search(const TimeDifference& difference, double expected, float sigma) {
-  sample(*difference.curve, samples_);
+void TimeFinder::find_roots(const Wanted& wanted) {
+  const TimeDifference& difference = wanted.difference;
   roots_.clear();
-  bool seen = false;
   double before = nan;
   for (int i = 0; i < samples_.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     const Eigen::Vector2d pixel(samples_.u[k], samples_.v[k]);
-    const double value = std::isnan(pixel.x()) ? nan : to_.time_at(pixel) - difference.time;
-    seen = seen || !std::isnan(pixel.x());
+    const double value = std::isnan(pixel.x()) ? nan : to_.field->time_at(pixel) - difference.time;
     if (before * value <= 0) {
       const double low = samples_.inverse_depth[k - 1], high = samples_.inverse_depth[k];
       const auto root = solve(difference, {low, high, before, value}, high - low);
@@ -155,13 +184,24 @@ Match TimeFinder::search(const TimeDifference& difference, double expected, floa
     }
     before = value;
   }
-  if (!seen) return Match::none(PixelStatus::outside_view);
-  if (roots_.empty()) return Match::none(PixelStatus::no_match);
-  const auto root = choose(roots_, expected, 1 / difference.curve->speed(roots_[0]));
-  return root ? match_at(*root, difference, sigma) : Match::none(PixelStatus::ambiguous);
 }
 
-Match TimeFinder::match_at(double root, const TimeDifference& difference, float sigma) const {
+Match TimeFinder::search(const Wanted& wanted, double expected) {
+  sample(*wanted.difference.curve, samples_);
+  const auto& columns = samples_.u;
+  if (std::all_of(columns.begin(), columns.begin() + samples_.size(), [](auto u) { return std::isnan(u); }))
+    return Match::none(PixelStatus::outside_view);
+  find_roots(wanted);
+  std::erase_if(roots_, [&](double root) { return contrast(root, wanted) > impossible; });
+  const auto is_alike = [&](double root) { return contrast(root, wanted) < suspicious; };
+  if (std::ranges::any_of(roots_, is_alike)) std::erase_if(roots_, std::not_fn(is_alike));
+  if (roots_.empty()) return Match::none(PixelStatus::no_match);
+  const auto root = choose(roots_, expected, 1 / wanted.difference.curve->speed(roots_[0]));
+  return root ? match_at(*root, wanted) : Match::none(PixelStatus::ambiguous);
+}
+
+Match TimeFinder::match_at(double root, const Wanted& wanted) const {
+  const TimeDifference& difference = wanted.difference;
   const EpipolarCurve& curve = *difference.curve;
   const auto pixel = curve.at(root);
   if (!pixel) return Match::none(PixelStatus::outside_view);
@@ -171,9 +211,9 @@ Match TimeFinder::match_at(double root, const TimeDifference& difference, float 
   double slope = 0.5 * (behind - before);
   if (std::isnan(slope)) slope = std::isnan(behind) ? here - before : behind - here;
   if (!std::isfinite(slope)) return Match::none(PixelStatus::no_match);
-  const double variance = static_cast<double>(sigma) * sigma + to_.variance_at(*pixel);
+  const double variance = static_cast<double>(wanted.sigma) * wanted.sigma + to_.field->variance_at(*pixel);
   const double sigma_px = std::sqrt(variance) / std::abs(slope);
-  if (!(sigma_px <= max_sigma_px_)) return Match::none(PixelStatus::ambiguous);
+  if (!(sigma_px <= to_.max_sigma_px)) return Match::none(PixelStatus::ambiguous);
   return {PixelStatus::ok, *pixel, sigma_px, root, slope};
 }
 
@@ -189,8 +229,9 @@ MatchPair match_times(const TimeMap& first, const TimeMap& second, const Camera&
   require_size(first, first_camera);
   require_size(second, second_camera);
   const TimeField first_field(first), second_field(second);
-  const TimeMatcher from_first(first, second_field, options.max_sigma_px),
-      from_second(second, first_field, options.max_sigma_px);
+  const double brightness = usual_amplitude(second) / usual_amplitude(first);
+  const TimeMatcher from_first(first, {&second_field, brightness, options.max_sigma_px}),
+      from_second(second, {&first_field, 1 / brightness, options.max_sigma_px});
   return match_both_ways(first_camera, second_camera, from_first, from_second, options, progress);
 }
 

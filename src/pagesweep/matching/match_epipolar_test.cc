@@ -178,6 +178,29 @@ TEST_F(MatchTimesOfAFlatPage, TwoEqualPlacesAreAmbiguous) {
   EXPECT_GT(ambiguous, 2000);  // elsewhere the curve shows only one of the places
 }
 
+TEST_F(MatchTimesOfAFlatPage, StrayLightWithTheSameTimesIsNoMatch) {
+  // Behind the page's edge, dark pixels repeat the times of the bright ones before it, as in a mirror.
+  const TimeMap seen = times2;
+  const int edge = 50;
+  for (int y = 0; y < edge; ++y)
+    for (int x = 0; x < 120; ++x) {
+      times2.time(x, y) = seen.time(x, 2 * edge - y);
+      times2.status(x, y) = seen.status(x, 2 * edge - y);
+      times2.sigma(x, y) = 0.2f;
+      times2.amplitude(x, y) = 4;
+    }
+  const MatchPair pair = match_times(times1, times2, cam1, cam2);
+  const Correspondences truth = flat.correspondences(cam1, cam2);
+  int matched = 0;
+  for (int y = 0; y < 120; ++y)
+    for (int x = 0; x < 120; ++x) {
+      if (pair.from_first.status(x, y) != PixelStatus::ok || truth.status(x, y) != PixelStatus::ok) continue;
+      EXPECT_NEAR(pair.from_first.v(x, y), truth.v(x, y), 0.1);
+      ++matched;
+    }
+  EXPECT_GT(matched, 2000);
+}
+
 TEST_F(MatchTimesOfAFlatPage, KeepsWithinTheGivenDepths) {
   MatchOptions options;
   options.near_mm = 100;

@@ -66,6 +66,14 @@ double TimeField::time_at(const Eigen::Vector2d& pixel) const {
   return upper + c.b * (lower - upper);
 }
 
+double TimeField::amplitude_at(const Eigen::Vector2d& pixel) const {
+  const Cell c = cell_at(pixel);
+  const auto& amplitude = map_->amplitude;
+  const double upper = (1 - c.a) * amplitude(c.x, c.y) + c.a * amplitude(c.x + 1, c.y);
+  const double lower = (1 - c.a) * amplitude(c.x, c.y + 1) + c.a * amplitude(c.x + 1, c.y + 1);
+  return (1 - c.b) * upper + c.b * lower;
+}
+
 double TimeField::variance_at(const Eigen::Vector2d& pixel) const {
   const Cell c = cell_at(pixel);
   const auto part = [&](int x, int y, double weight) {

@@ -20,6 +20,8 @@ class TimeField {
 
   /// Time at a position [frames] by bilinear interpolation; NaN where a pixel that takes part is missing or not linked.
   double time_at(const Eigen::Vector2d& pixel) const;
+  /// Amplitude at a position [gray values] by bilinear interpolation.
+  double amplitude_at(const Eigen::Vector2d& pixel) const;
   /// Variance [frames^2] of time_at, from the pixels' own sigma. \pre time_at is a number
   double variance_at(const Eigen::Vector2d& pixel) const;
 

@@ -49,24 +49,11 @@ class Surroundings {
     const auto plane = around_.fit_robustly();
     if (!plane) return std::nullopt;
     return Comparison{-plane->middle, dx * plane->across + dy * plane->down, std::hypot(plane->across, plane->down),
-                      is_one_surface(*plane, x, y)};
+                      is_one_surface(*plane, times_.time, times_.sigma, x, y, radius)};
   }
 
  private:
   static constexpr int radius = 3;
-
-  /// Whether all times nearby keep to the plane, as far as noise and edges of print, which shift a spot's middle by
-  /// less than half a pixel, let them.
-  bool is_one_surface(const LocalPlane& plane, int x, int y) const {
-    const float half_pixel = 0.5f * std::hypot(plane.across, plane.down), here = times_.time(x, y);
-    for (int j = -radius; j <= radius; ++j)
-      for (int i = -radius; i <= radius; ++i) {
-        if (!times_.time.contains(x + i, y + j) || times_.status(x + i, y + j) != PixelStatus::ok) continue;
-        const float miss = times_.time(x + i, y + j) - here - plane.at(static_cast<float>(i), static_cast<float>(j));
-        if (std::abs(miss) > half_pixel + 6 * times_.sigma(x + i, y + j)) return false;
-      }
-    return true;
-  }
 
   const TimeMap& times_;
   const SpotOffsets& offsets_;

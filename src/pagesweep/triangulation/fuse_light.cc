@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "pagesweep/base/local_plane.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/camera/ray_table.h"
 #include "pagesweep/triangulation/light_section.h"
@@ -149,7 +150,7 @@ class Fusion {
         rays_(camera),
         lateness_(points, times, light) {}
 
-  void put(PointMap& points, int x, int y, FusionCounts& counts) const {
+  void put(PointMap& points, int x, int y, Neighbourhood& around, FusionCounts& counts) const {
     const bool matched = points.status(x, y) == PixelStatus::ok;
     if (times_.status(x, y) != PixelStatus::ok || !(matched || may_be_sectioned(points.status(x, y)))) return;
     const Eigen::Vector3d direction = rig_from_cam_ * rays_.direction(x, y).homogeneous();
@@ -160,11 +161,11 @@ class Fusion {
     if (!(met.distance_mm > 0 && std::isfinite(met.distance_mm))) return;
     const Estimate sheet{met.distance_mm, std::pow(times_.sigma(x, y) * met.mm_per_frame, 2)};
     const double depth = sheet.distance_mm / direction.norm();
-    // Where the sheet alone decides, it must know the distance better than half of what a pixel sees: at a step in
-    // depth the pixel's time is that of neither surface.
-    const bool decides = sheet.variance_mm2 < std::pow(0.5 * depth / camera_.fx, 2);
+    // Where the sheet alone decides, it must know the distance better than half of what a pixel sees.
+    const bool knows = sheet.variance_mm2 < std::pow(0.5 * depth / camera_.fx, 2);
+    const auto decides = [&] { return knows && is_inside_a_surface(x, y, around); };
     if (matched) return fuse(points, x, y, ray, met, sheet, decides, counts);
-    if (!decides || depth < options_.near_mm || (options_.far_mm > 0 && depth > options_.far_mm)) return;
+    if (!decides() || depth < options_.near_mm || (options_.far_mm > 0 && depth > options_.far_mm)) return;
     ++counts.added;
     set(points, x, y, ray, sheet);
   }
@@ -172,8 +173,17 @@ class Fusion {
   const RayTable& rays() const { return rays_; }
 
  private:
+  /// At a step in depth a pixel's time may be that of neither surface.
+  bool is_inside_a_surface(int x, int y, Neighbourhood& around) const {
+    constexpr int radius = 2;
+    around.gather(times_.time, x, y, radius);
+    const auto plane = around.fit_robustly();
+    return plane && is_one_surface(*plane, times_.time, times_.sigma, x, y, radius);
+  }
+
+  template <class Decides>
   void fuse(PointMap& points, int x, int y, const Ray& ray, const LightSection& met, const Estimate& sheet,
-            bool sheet_decides, FusionCounts& counts) const {
+            const Decides& sheet_decides, FusionCounts& counts) const {
     const Eigen::Vector3d point(points.x(x, y), points.y(x, y), points.z(x, y));
     const Estimate stereo{(point - ray.origin).dot(ray.direction), std::pow(points.sigma(x, y), 2)};
     // The pixel's time being late by e moves the stereo point by e / (d time_2 / d distance), the other by its speed e.
@@ -183,7 +193,7 @@ class Fusion {
     const double difference_variance = stereo.variance_mm2 + sheet.variance_mm2 - 2 * covariance;
     if (!(difference_variance > 0)) return;
     if (std::abs(sheet.distance_mm - stereo.distance_mm) > 6 * std::sqrt(difference_variance)) {
-      if (!sheet_decides) return reject(points, x, y);
+      if (!sheet_decides()) return reject(points, x, y);
       ++counts.corrected;
       return set(points, x, y, ray, sheet);
     }
@@ -228,7 +238,8 @@ FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const 
   const Fusion fusion(points, matches, times, camera, to, light, options);
   std::vector<FusionCounts> rows(static_cast<std::size_t>(camera.height));
   parallel_rows(camera.height, [&](int y) {
-    for (int x = 0; x < camera.width; ++x) fusion.put(points, x, y, rows[static_cast<std::size_t>(y)]);
+    Neighbourhood around;
+    for (int x = 0; x < camera.width; ++x) fusion.put(points, x, y, around, rows[static_cast<std::size_t>(y)]);
   });
   fit_normals(points, camera, fusion.rays(), options.normal_radius_px);
   FusionCounts all;
