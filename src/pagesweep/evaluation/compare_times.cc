@@ -6,20 +6,24 @@
 #include <stdexcept>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/evaluation/compare_kinds.h"
 
 namespace pagesweep {
 namespace {
 
 /// Errors with what the time values claim, gathered for one kind of pixel.
 struct Tally {
-  std::vector<double> errors, claims, bounds;
+  std::vector<double> errors, claims, bounds, normalised;
 
   void add(double error, double claim, double bound) {
     errors.push_back(error);
-    if (claim > 0 && std::isfinite(claim)) claims.push_back(claim);
+    if (claim > 0 && std::isfinite(claim)) {
+      claims.push_back(claim);
+      normalised.push_back(error / claim);
+    }
     if (bound > 0 && std::isfinite(bound)) bounds.push_back(bound);
   }
-  TimeErrors summary() const { return {summarise(errors), rms_of(claims), rms_of(bounds)}; }
+  TimeErrors summary() const { return {summarise(errors), rms_of(claims), rms_of(bounds), rms_of(normalised)}; }
 };
 
 /// Time value minus true time [frames], NaN where either is missing.
@@ -42,14 +46,6 @@ double median_of_all(std::span<const Image<float>> maps) {
     for (const float value : map.pixels())
       if (std::isfinite(value)) values.push_back(value);
   return quantile(values, 0.5);
-}
-
-/// Share by which the amplitude changes from pixel to pixel; NaN beside pixels without one.
-double relative_gradient(const Image<float>& amplitude, int x, int y) {
-  if (!amplitude.contains(x - 1, y - 1) || !amplitude.contains(x + 1, y + 1)) return ErrorSummary::none;
-  const double dx = 0.5 * (amplitude(x + 1, y) - amplitude(x - 1, y));
-  const double dy = 0.5 * (amplitude(x, y + 1) - amplitude(x, y - 1));
-  return std::hypot(dx, dy) / amplitude(x, y);
 }
 
 void check(std::span<const TimedView> views) {

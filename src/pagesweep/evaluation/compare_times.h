@@ -28,7 +28,8 @@ struct TimeErrors {
   ErrorSummary error;                       ///< [frames] the common offset removed
   double claimed_rms = ErrorSummary::none;  ///< [frames] rms that the time values' own standard deviations predict
 
-  double bound_rms = ErrorSummary::none;  ///< [frames] rms that no unbiased estimator can undercut
+  double bound_rms = ErrorSummary::none;       ///< [frames] rms that no unbiased estimator can undercut
+  double normalised_rms = ErrorSummary::none;  ///< of error over claim, value by value: 1 if they claim right
 
   double error_over_claim() const { return error.rms / claimed_rms; }
   double error_over_bound() const { return error.rms / bound_rms; }

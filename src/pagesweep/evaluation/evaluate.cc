@@ -123,6 +123,36 @@ void evaluate_times(const std::vector<CameraData>& cameras, const Rig& rig, cons
     evaluation.times = compare_times(views, *rig.light, options.times, bound);
 }
 
+/// Places on the line where two neighbouring pages meet: of their borders, the two that are nearest to each other.
+std::vector<Eigen::Vector3f> find_gutter(const Truth& truth) {
+  constexpr int places = 80;
+  constexpr float farthest_mm = 30;
+  const auto border = [](const Image<Eigen::Vector3f>& points, int column) {
+    std::vector<Eigen::Vector3f> line;
+    for (int k = 0; k < places; ++k) line.push_back(points(column, k * (points.height() - 1) / (places - 1)));
+    return line;
+  };
+  std::vector<Eigen::Vector3f> gutter;
+  for (std::size_t p = 0; p + 1 < truth.pages.size(); ++p) {
+    const auto left = read_page_points(truth, truth.pages[p].index),
+               right = read_page_points(truth, truth.pages[p + 1].index);
+    const auto one = border(left, left.width() - 1), other = border(right, 0);
+    for (std::size_t k = 0; k < one.size(); ++k)
+      if ((one[k] - other[k]).norm() < farthest_mm) gutter.push_back(0.5f * (one[k] + other[k]));
+  }
+  return gutter;
+}
+
+void evaluate_kinds(const Truth& truth, const std::vector<CameraData>& cameras, const BoundOfAmplitude& bound,
+                    const EvaluationOptions& options, Evaluation& evaluation) {
+  std::vector<KindView> views;
+  for (std::size_t c = 0; c < cameras.size(); ++c)
+    if (cameras[c].points && cameras[c].times && evaluation.points && c < evaluation.points->error_maps.size())
+      views.push_back({cameras[c].camera, &*cameras[c].points, &*cameras[c].times, &cameras[c].truth,
+                       &evaluation.points->error_maps[c]});
+  if (!views.empty()) evaluation.kinds = compare_kinds(views, find_gutter(truth), options.times, bound);
+}
+
 /// The resolution that the page's picture states; 0 if it states none.
 double page_scale(const PageFiles& files) {
   const auto pictures = files.pictures();
@@ -167,7 +197,9 @@ Evaluation evaluate(const fs::path& out, const fs::path& truth_folder, const Eva
   progress.begin("points against the true surface");
   evaluate_points(out, cameras, options, evaluation);
   progress.begin("time values against the light's middle");
-  evaluate_times(cameras, rig, find_bound(truth, capture), options, evaluation);
+  const BoundOfAmplitude bound = find_bound(truth, capture);
+  evaluate_times(cameras, rig, bound, options, evaluation);
+  evaluate_kinds(truth, cameras, bound, options, evaluation);
   progress.begin("pages against the printed ones");
   for (const TruthPage& page : truth.pages) {
     evaluation.pages.push_back(evaluate_page(out, truth, page, options));

@@ -9,6 +9,7 @@
 
 #include "pagesweep/base/progress.h"
 #include "pagesweep/data/figure.h"
+#include "pagesweep/evaluation/compare_kinds.h"
 #include "pagesweep/evaluation/compare_pages.h"
 #include "pagesweep/evaluation/compare_points.h"
 #include "pagesweep/evaluation/compare_times.h"
@@ -41,9 +42,11 @@ struct PageEvaluation {
 struct Evaluation {
   std::vector<std::string> cameras;  ///< those with a truth, in the rig's order
   std::optional<PointComparison> points;
-  std::optional<ErrorSummary> clipped_points;  ///< [mm] of pixels that were clipped in some frame; if the result says which
-  bool points_from_cloud = false;  ///< from points.ply, without knowing the pixels; only points->all holds figures
-  std::string points_reason;       ///< why there are none
+  std::optional<ErrorSummary>
+      clipped_points;                   ///< [mm] of pixels that were clipped in some frame; if the result says which
+  bool points_from_cloud = false;       ///< from points.ply, without knowing the pixels; only points->all holds figures
+  std::string points_reason;            ///< why there are none
+  std::optional<KindComparison> kinds;  ///< if there are points and time values
   std::optional<TimeComparison> times;
   std::string times_reason;
   std::vector<PageEvaluation> pages;  ///< the truth's

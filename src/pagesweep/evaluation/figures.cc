@@ -84,6 +84,24 @@ void add_points(const Evaluation& evaluation, std::vector<Figure>& figures) {
   }
 }
 
+void add_kinds(const Evaluation& evaluation, std::vector<Figure>& figures) {
+  if (!evaluation.kinds) return;
+  const auto add = [&](const std::string& kind, const std::string& where, const PointsOfKind& points) {
+    if (points.distance.count == 0) return;
+    Group group(figures, "points_" + kind, "");
+    Group bound(figures, "points_" + kind, "the truth does not tell the stripe's profile and the sensor's noise");
+    group.add("rms", "distance to the true surface " + where + ", rms", points.distance.rms, "mm");
+    group.add("p95", "distance that 95 % of them keep", points.distance.p95, "mm");
+    group.add("error_over_claim", "rms over what they claim", points.error_over_claim());
+    bound.add("error_over_bound", "rms over what the Cramér-Rao bound predicts", points.error_over_bound());
+  };
+  add("blank", "away from print", evaluation.kinds->blank);
+  add("print", "in printed areas", evaluation.kinds->print);
+  add("bright_print", "in printed areas, bright pixels", evaluation.kinds->bright_print);
+  add("near_gutter", "within 15 mm of the gutter", evaluation.kinds->near_gutter);
+  add("elsewhere", "farther from the gutter", evaluation.kinds->elsewhere);
+}
+
 void add_times(const Evaluation& evaluation, std::vector<Figure>& figures) {
   const TimeComparison times = evaluation.times.value_or(TimeComparison{});
   Group group(figures, "times", evaluation.times ? "there are no pixels of this kind" : evaluation.times_reason);
@@ -94,6 +112,7 @@ void add_times(const Evaluation& evaluation, std::vector<Figure>& figures) {
     group.add(prefix + "rms", "error" + which + ", rms", errors.error.rms, "frames");
     group.add(prefix + "p95", "error that 95 % keep" + which, errors.error.p95, "frames");
     group.add(prefix + "error_over_claim", "rms over what the time values claim" + which, errors.error_over_claim());
+    group.add(prefix + "normalised_rms", "error over each value's claim, rms" + which, errors.normalised_rms);
     bound.add(prefix + "error_over_bound", "rms over the Cramér-Rao bound" + which, errors.error_over_bound());
   };
   add("", "", times.all);
@@ -157,6 +176,7 @@ std::string format_value(const Figure& figure) {
 std::vector<Figure> figures_of(const Evaluation& evaluation) {
   std::vector<Figure> figures;
   add_points(evaluation, figures);
+  add_kinds(evaluation, figures);
   add_times(evaluation, figures);
   add_all_pages(evaluation, figures);
   for (const PageEvaluation& page : evaluation.pages) add_page(page, figures);

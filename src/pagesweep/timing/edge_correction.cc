@@ -32,7 +32,8 @@ float derivative(float before2, float before, float after, float after2) {
 struct Comparison {
   float misfit;      ///< [frames] own time less the plane's
   float leaning;     ///< [frames] offset . gradient of time
-  float pixel;       ///< [frames] that the stripe takes over a pixel
+  float offset;      ///< [px] its length
+  float pixel;       ///< [frames] that the stripe takes over a pixel of the surface
   bool one_surface;  ///< there is no step in depth nearby
 };
 
@@ -48,12 +49,26 @@ class Surroundings {
     around_.gather(times_.time, x, y, radius);
     const auto plane = around_.fit_robustly();
     if (!plane) return std::nullopt;
-    return Comparison{-plane->middle, dx * plane->across + dy * plane->down, std::hypot(plane->across, plane->down),
+    return Comparison{-plane->middle, dx * plane->across + dy * plane->down, std::hypot(dx, dy), frames_a_pixel(x, y),
                       is_one_surface(*plane, times_.time, times_.sigma, x, y, radius)};
   }
 
  private:
   static constexpr int radius = 3;
+
+  /// From the more equal of the neighbours on either side: between the others there may be a step.
+  float frames_a_pixel(int x, int y) const {
+    const auto step = [&](int dx, int dy) {
+      const auto difference = [&](int sign) {
+        const int column = x + sign * dx, row = y + sign * dy;
+        return times_.time.contains(column, row) ? std::abs(times_.time(column, row) - times_.time(x, y))
+                                                 : not_a_number;
+      };
+      const float least = std::fmin(difference(1), difference(-1));  // passes over NaN
+      return std::isfinite(least) ? least : 0;
+    };
+    return std::hypot(step(1, 0), step(0, 1));
+  }
 
   const TimeMap& times_;
   const SpotOffsets& offsets_;
@@ -159,8 +174,8 @@ void correct_edges(TimeMap& times, const SpotOffsets& offsets, const EdgeCorrect
       if (!seen) continue;
       const double shift = correction.gain * seen->leaning;
       // On two surfaces the spot's middle is somewhere in the pixel: evenly distributed over it, at most.
-      const double doubt =
-          seen->one_surface ? correction.scatter * shift : std::min(std::abs(shift), seen->pixel / std::sqrt(12.0));
+      const double off_px = std::min(correction.gain * seen->offset, 1 / std::sqrt(12.0));
+      const double doubt = seen->one_surface ? correction.scatter * shift : off_px * seen->pixel;
       if (seen->one_surface) corrected(x, y) -= static_cast<float>(shift);
       times.sigma(x, y) = static_cast<float>(std::hypot(times.sigma(x, y), doubt));
     }
