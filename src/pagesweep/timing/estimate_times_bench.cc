@@ -3,6 +3,7 @@
 
 #include <array>
 #include <numeric>
+#include <string>
 
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/timing/estimate_times.h"
@@ -42,15 +43,18 @@ void estimate_times_of_a_camera(benchmark::State& state) {
     for (int x = 0; x < width; ++x) {
       if (is_teaching(y) || map.status(x, y) != PixelStatus::ok) continue;
       const testing::Pixel pixel = pixel_at(x, y);
-      const double bound = testing::cramer_rao_bound(shape, pixel, sensor, frame_count);
+      const double least = testing::cramer_rao_bound(shape, pixel, sensor, frame_count);
       const double error = map.time(x, y) - pixel.time;
       const auto phase = static_cast<std::size_t>((pixel.time - std::floor(pixel.time)) * phases);
-      squares += error * error, bounds += bound * bound, count += 1;
+      squares += error * error, bounds += least * least, count += 1;
       normalised += std::pow(error / map.sigma(x, y), 2);
       bias[phase] += error, hits[phase] += 1;
     }
   double bias_squares = 0;
   const double mean = std::accumulate(bias.begin(), bias.end(), 0.0) / count;  // of no consequence: cameras share it
+  const double bound = std::sqrt(bounds / count);
+  for (std::size_t i = 0; i < phases; ++i)
+    state.counters["bias_vs_bound_at_phase_" + std::to_string(i)] = (bias[i] / hits[i] - mean) / bound;
   for (std::size_t i = 0; i < phases; ++i) bias_squares += std::pow(bias[i] / hits[i] - mean, 2) / phases;
   bias_squares = std::max(0.0, bias_squares - squares / count / (count / phases));  // without its own noise
   state.counters["error_vs_bound"] = std::sqrt(squares / bounds);
