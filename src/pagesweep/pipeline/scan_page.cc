@@ -93,9 +93,9 @@ void find_points(const std::vector<Frames>& frames, const Rig& rig, const ScanOp
 void correct_by_amplitude(const std::vector<TimeMap>& seen, Measurement& measurement) {
   measurement.edges.clear();
   for (std::size_t c = 0; c < seen.size(); ++c) {
-    const SpotOffsets offsets = offsets_from_amplitude(seen[c]);
-    measurement.edges.push_back(fit_edges(seen[c], offsets));
-    correct_edges(measurement.timing->maps[c], offsets, measurement.edges[c]);
+    const auto comparisons = compare_with_surroundings(seen[c], offsets_from_amplitude(seen[c]));
+    measurement.edges.push_back(fit_edges(seen[c], comparisons));
+    correct_edges(measurement.timing->maps[c], comparisons, measurement.edges[c]);
   }
 }
 
@@ -107,7 +107,8 @@ void correct_by_scan(const std::vector<TimeMap>& seen, const Scanner& scanner, c
     const double spot_variance_px2 = measurement.edges[c].gain;
     if (!(spot_variance_px2 > 0)) continue;
     const SpotOffsets offsets = weigh_footprints(measurement.points[c], scanner, scan, spot_variance_px2);
-    const EdgeCorrection correction = fit_edges(seen[c], offsets);
+    const auto comparisons = compare_with_surroundings(seen[c], offsets);
+    const EdgeCorrection correction = fit_edges(seen[c], comparisons);
     if (!(correction.after < measurement.edges[c].after)) continue;
     TimeMap& times = measurement.timing->maps[c];
     for (std::size_t i = 0; i < times.time.size(); ++i) {
@@ -115,7 +116,7 @@ void correct_by_scan(const std::vector<TimeMap>& seen, const Scanner& scanner, c
       times.time.data()[i] = seen[c].time.data()[i];
       times.sigma.data()[i] = seen[c].sigma.data()[i];
     }
-    correct_edges(times, offsets, correction);
+    correct_edges(times, comparisons, correction);
     measurement.edges[c] = correction;
   }
 }

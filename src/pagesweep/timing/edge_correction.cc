@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
-#include <vector>
 
 #include "pagesweep/base/local_plane.h"
 #include "pagesweep/base/parallel.h"
@@ -16,11 +14,6 @@ namespace {
 /// Offsets beyond are the work of something else than an edge of print.
 constexpr float largest_offset_px = 2;
 
-void require_size(const TimeMap& times, const SpotOffsets& offsets) {
-  if (times.width() != offsets.width() || times.height() != offsets.height())
-    throw std::invalid_argument("edge correction: time map and offsets differ in size");
-}
-
 /// Derivative of the samples at -2..2 at the middle one, exact for cubics; over fewer neighbours at borders.
 float derivative(float before2, float before, float after, float after2) {
   const float narrow = 0.5f * (after - before);
@@ -28,29 +21,18 @@ float derivative(float before2, float before, float after, float after2) {
   return std::isfinite(wide) ? (4 * narrow - wide) / 3 : narrow;
 }
 
-/// How one pixel's time compares with the plane through those around it.
-struct Comparison {
-  float misfit;      ///< [frames] own time less the plane's
-  float leaning;     ///< [frames] offset . gradient of time
-  float offset;      ///< [px] its length
-  float pixel;       ///< [frames] that the stripe takes over a pixel of the surface
-  bool one_surface;  ///< there is no step in depth nearby
-};
-
 class Surroundings {
  public:
   Surroundings(const TimeMap& times, const SpotOffsets& offsets) : times_(times), offsets_(offsets) {}
 
-  /// Nothing where the pixel has no time, no offset or too few neighbours.
-  std::optional<Comparison> look(int x, int y) {
+  EdgeComparison look(int x, int y) {
     const float dx = offsets_.dx(x, y), dy = offsets_.dy(x, y);
-    if (times_.status(x, y) != PixelStatus::ok || !(std::abs(dx) + std::abs(dy) < largest_offset_px))
-      return std::nullopt;
+    if (times_.status(x, y) != PixelStatus::ok || !(std::abs(dx) + std::abs(dy) < largest_offset_px)) return {};
     around_.gather(times_.time, x, y, radius);
     const auto plane = around_.fit_robustly();
-    if (!plane) return std::nullopt;
-    return Comparison{-plane->middle, dx * plane->across + dy * plane->down, std::hypot(dx, dy), frames_a_pixel(x, y),
-                      is_one_surface(*plane, times_.time, times_.sigma, x, y, radius)};
+    if (!plane) return {};
+    return {-plane->middle, dx * plane->across + dy * plane->down, std::hypot(dx, dy), frames_a_pixel(x, y),
+            is_one_surface(*plane, times_.time, times_.sigma, x, y, radius)};
   }
 
  private:
@@ -80,43 +62,27 @@ struct Sums {
   double ll = 0, lm = 0, mm = 0;  ///< leaning and misfit, both over sigma
   double fourth = 0, excess = 0;  ///< leaning^4, leaning^2 (rest^2 - sigma^2)
   long long count = 0;
-
-  void add(const Sums& other) {
-    ll += other.ll;
-    lm += other.lm;
-    mm += other.mm;
-    fourth += other.fourth;
-    excess += other.excess;
-    count += other.count;
-  }
 };
 
 /// Sums over the pixels at edges whose rest, with that gain, is within `limit` sigmas.
-Sums gather(const TimeMap& times, const SpotOffsets& offsets, double gain, double limit) {
-  constexpr int grain = 16;
-  std::vector<Sums> parts(static_cast<std::size_t>((times.height() + grain - 1) / grain));
-  parallel_ranges(times.height(), grain, [&](int begin, int end) {
-    Sums& sums = parts[static_cast<std::size_t>(begin / grain)];
-    Surroundings surroundings(times, offsets);
-    for (int y = begin; y < end; ++y)
-      for (int x = 0; x < times.width(); ++x) {
-        const auto seen = surroundings.look(x, y);
-        if (!seen || !seen->one_surface) continue;
-        const double sigma = times.sigma(x, y);
-        const double leaning = seen->leaning / sigma, misfit = seen->misfit / sigma, rest = misfit - gain * leaning;
-        // A leaning that no gain below 1 px^2 makes as large as a fifth of the noise tells nothing.
-        if (std::abs(leaning) < 0.2 || !(std::abs(rest) < limit)) continue;
-        sums.ll += leaning * leaning;
-        sums.lm += leaning * misfit;
-        sums.mm += misfit * misfit;
-        sums.fourth += std::pow(leaning, 4);
-        sums.excess += leaning * leaning * (rest * rest - 1);
-        ++sums.count;
-      }
-  });
-  Sums all;
-  for (const Sums& part : parts) all.add(part);
-  return all;
+Sums gather(const TimeMap& times, const Image<EdgeComparison>& comparisons, double gain, double limit) {
+  Sums sums;
+  for (std::size_t i = 0; i < comparisons.size(); ++i) {
+    const EdgeComparison& seen = comparisons.data()[i];
+    if (!seen.one_surface) continue;
+    const double sigma = times.sigma.data()[i];
+    const double leaning = seen.leaning / sigma, misfit = seen.misfit / sigma, rest = misfit - gain * leaning;
+    // A leaning that no gain below 1 px^2 makes as large as a fifth of the noise tells nothing.
+    if (!(std::abs(leaning) >= 0.2) || !(std::abs(rest) < limit)) continue;
+    const double square = leaning * leaning;
+    sums.ll += square;
+    sums.lm += leaning * misfit;
+    sums.mm += misfit * misfit;
+    sums.fourth += square * square;
+    sums.excess += square * (rest * rest - 1);
+    ++sums.count;
+  }
+  return sums;
 }
 
 }  // namespace
@@ -139,22 +105,32 @@ SpotOffsets offsets_from_amplitude(const TimeMap& times) {
   return offsets;
 }
 
-EdgeCorrection fit_edges(const TimeMap& times, const SpotOffsets& offsets) {
-  require_size(times, offsets);
+Image<EdgeComparison> compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets) {
+  if (times.width() != offsets.width() || times.height() != offsets.height())
+    throw std::invalid_argument("edge correction: time map and offsets differ in size");
+  Image<EdgeComparison> comparisons(times.width(), times.height(), EdgeComparison{});
+  parallel_rows(times.height(), [&](int y) {
+    Surroundings surroundings(times, offsets);
+    for (int x = 0; x < times.width(); ++x) comparisons(x, y) = surroundings.look(x, y);
+  });
+  return comparisons;
+}
+
+EdgeCorrection fit_edges(const TimeMap& times, const Image<EdgeComparison>& comparisons) {
   constexpr double widest = 20, usual = 6;
   EdgeCorrection correction;
   // Outliers are what the last gain leaves far away; the limit narrows as the gain gets better.
   double gain = 0;
   Sums sums;
   for (const double limit : {widest, usual, usual}) {
-    sums = gather(times, offsets, gain, limit);
+    sums = gather(times, comparisons, gain, limit);
     if (sums.count < 100 || !(sums.ll > 0)) return correction;
     gain = sums.lm / sums.ll;
   }
   const double gain_sigma = 1 / std::sqrt(sums.ll);
   correction.edges = sums.count;
   if (gain < 5 * gain_sigma) return correction;
-  sums = gather(times, offsets, gain, usual);
+  sums = gather(times, comparisons, gain, usual);
   correction.gain = gain;
   const double rest = sums.mm - 2 * gain * sums.lm + gain * gain * sums.ll;
   correction.before = std::sqrt(sums.mm / static_cast<double>(sums.count));
@@ -163,24 +139,19 @@ EdgeCorrection fit_edges(const TimeMap& times, const SpotOffsets& offsets) {
   return correction;
 }
 
-void correct_edges(TimeMap& times, const SpotOffsets& offsets, const EdgeCorrection& correction) {
-  require_size(times, offsets);
+void correct_edges(TimeMap& times, const Image<EdgeComparison>& comparisons, const EdgeCorrection& correction) {
   if (!(correction.gain > 0)) return;
-  Image<float> corrected = times.time;
-  parallel_rows(times.height(), [&](int y) {
-    Surroundings surroundings(times, offsets);
-    for (int x = 0; x < times.width(); ++x) {
-      const auto seen = surroundings.look(x, y);
-      if (!seen) continue;
-      const double shift = correction.gain * seen->leaning;
-      // On two surfaces the spot's middle is somewhere in the pixel: evenly distributed over it, at most.
-      const double off_px = std::min(correction.gain * seen->offset, 1 / std::sqrt(12.0));
-      const double doubt = seen->one_surface ? correction.scatter * shift : off_px * seen->pixel;
-      if (seen->one_surface) corrected(x, y) -= static_cast<float>(shift);
-      times.sigma(x, y) = static_cast<float>(std::hypot(times.sigma(x, y), doubt));
-    }
-  });
-  times.time = std::move(corrected);
+  for (std::size_t i = 0; i < comparisons.size(); ++i) {
+    const EdgeComparison& seen = comparisons.data()[i];
+    if (!std::isfinite(seen.leaning)) continue;
+    const double shift = correction.gain * seen.leaning;
+    // On two surfaces the spot's middle is somewhere in the pixel: evenly distributed over it, at most.
+    const double off_px = std::min(correction.gain * seen.offset_px, 1 / std::sqrt(12.0));
+    const double doubt = seen.one_surface ? correction.scatter * shift : off_px * seen.pixel;
+    float& sigma = times.sigma.data()[i];
+    sigma = static_cast<float>(std::hypot(sigma, doubt));
+    if (seen.one_surface) times.time.data()[i] -= static_cast<float>(shift);
+  }
 }
 
 }  // namespace pagesweep

@@ -11,6 +11,19 @@ namespace pagesweep {
 /// point spread function it is exact up to the amplitudes' noise and sampling. See docs/derivations/edges.md.
 SpotOffsets offsets_from_amplitude(const TimeMap& times);
 
+/// How one pixel's time compares with the plane through those around it.
+struct EdgeComparison {
+  float misfit = not_a_number;   ///< [frames] own time less the plane's; NaN: nothing to compare
+  float leaning = not_a_number;  ///< [frames] offset . gradient of time
+  float offset_px = 0;           ///< length of the offset
+  float pixel = 0;               ///< [frames] that the stripe takes over a pixel of the surface
+  bool one_surface = false;      ///< there is no step in depth nearby
+};
+
+/// Compares each time value that has an offset with the plane through those around it.
+/// \throws std::invalid_argument  if the sizes differ
+Image<EdgeComparison> compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets);
+
 /// What a map of time values says about spot offsets.
 struct EdgeCorrection {
   double gain = 0;      ///< by which the offsets explain the times best; 0: not at all
@@ -20,14 +33,14 @@ struct EdgeCorrection {
   long long edges = 0;  ///< pixels whose offset is large enough to be seen
 };
 
-/// Compares each time value with the plane through those around it: across a print edge it is off by
-/// gain offset . gradient(time), if the offsets are true. The gain is fitted robustly.
-/// \throws std::invalid_argument  if the sizes differ
-EdgeCorrection fit_edges(const TimeMap& times, const SpotOffsets& offsets);
+/// Across a print edge a time value is off by gain offset . gradient(time), if the offsets are true. The gain is fitted
+/// robustly; one that is not significant is 0.
+EdgeCorrection fit_edges(const TimeMap& times, const Image<EdgeComparison>& comparisons);
 
 /// Moves time values from the middles of the spots, where they are true, to the pixels' centres; sigma grows by what
-/// the correction leaves open. Pixels without an offset are left alone.
-/// \throws std::invalid_argument  if the sizes differ
-void correct_edges(TimeMap& times, const SpotOffsets& offsets, const EdgeCorrection& correction);
+/// the correction leaves open. At a step in depth, where the spot lies on two surfaces, the time stays and sigma grows
+/// by what the offset may be worth. Pixels without an offset are left alone.
+/// \param times  those that were compared
+void correct_edges(TimeMap& times, const Image<EdgeComparison>& comparisons, const EdgeCorrection& correction);
 
 }  // namespace pagesweep

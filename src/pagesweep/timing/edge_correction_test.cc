@@ -51,8 +51,9 @@ TEST(EdgeCorrection, TweediesFormulaTakesMostOfTheErrorAndOwnsUpToTheRest) {
   TimeMap map = printed_page();
   const double before = error_over_sigma(map);
   const SpotOffsets offsets = offsets_from_amplitude(map);
-  const EdgeCorrection correction = fit_edges(map, offsets);
-  correct_edges(map, offsets, correction);
+  const auto comparisons = compare_with_surroundings(map, offsets);
+  const EdgeCorrection correction = fit_edges(map, comparisons);
+  correct_edges(map, comparisons, correction);
   EXPECT_GT(before, 2.5);
   // The spot's variance, as far as pixels a whole spot apart can tell a gradient.
   EXPECT_NEAR(correction.gain, spot_variance, 0.25 * spot_variance);
@@ -76,9 +77,10 @@ TEST(EdgeCorrection, TrueOffsetsLeaveTheNoiseAlone) {
       offsets.dx(x, y) = static_cast<float>(mx / mass);
       offsets.dy(x, y) = static_cast<float>(my / mass);
     }
-  const EdgeCorrection correction = fit_edges(map, offsets);
+  const auto comparisons = compare_with_surroundings(map, offsets);
+  const EdgeCorrection correction = fit_edges(map, comparisons);
   EXPECT_NEAR(correction.gain, 1, 0.1);  // errors at edges pull the planes along that they are compared with
-  correct_edges(map, offsets, correction);
+  correct_edges(map, comparisons, correction);
   EXPECT_NEAR(error_over_sigma(map), 1, 0.08);
 }
 
@@ -92,17 +94,18 @@ TEST(EdgeCorrection, OffsetsThatExplainNothingChangeNothing) {
     offsets.dx.data()[i] = normal(random);
     offsets.dy.data()[i] = normal(random);
   }
-  const EdgeCorrection correction = fit_edges(map, offsets);
+  const auto comparisons = compare_with_surroundings(map, offsets);
+  const EdgeCorrection correction = fit_edges(map, comparisons);
   EXPECT_EQ(correction.gain, 0);
-  correct_edges(map, offsets, correction);
+  correct_edges(map, comparisons, correction);
   for (std::size_t i = 0; i < map.time.size(); ++i) EXPECT_EQ(map.time.data()[i], before.time.data()[i]);
 }
 
 TEST(EdgeCorrection, AtAStepInDepthOnlySigmaGrows) {
   TimeMap map = printed_page(true);
   const TimeMap before = map;
-  const SpotOffsets offsets = offsets_from_amplitude(map);
-  correct_edges(map, offsets, fit_edges(map, offsets));
+  const auto comparisons = compare_with_surroundings(map, offsets_from_amplitude(map));
+  correct_edges(map, comparisons, fit_edges(map, comparisons));
   for (int y = 4; y < 60; ++y) {
     EXPECT_EQ(map.time(31, y), before.time(31, y));
     EXPECT_GE(map.sigma(31, y), before.sigma(31, y));
@@ -110,7 +113,7 @@ TEST(EdgeCorrection, AtAStepInDepthOnlySigmaGrows) {
 }
 
 TEST(EdgeCorrection, RefusesOtherSizes) {
-  EXPECT_THROW(fit_edges(TimeMap(4, 4), SpotOffsets(5, 4)), std::invalid_argument);
+  EXPECT_THROW(compare_with_surroundings(TimeMap(4, 4), SpotOffsets(5, 4)), std::invalid_argument);
 }
 
 }  // namespace
