@@ -57,6 +57,7 @@ format: tools  ## format every source file
 
 .PHONY: results
 results: build  ## measure every figure of docs/results.md; table and build/results/results.json
+	cmake --preset bench && cmake --build --preset bench -j $(jobs) --target timing_bench
 	scripts/results
 
 .PHONY: bench
