@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 namespace pagesweep::cli {
 namespace {
@@ -56,6 +57,14 @@ Description describe_camera(const Camera& camera) {
   return description;
 }
 
+void add_exposures(const SequenceFiles& files, Description& description) {
+  const auto [shortest, longest] = std::ranges::minmax(files.exposure_ms);
+  const std::string range =
+      shortest == longest ? fmt::format("{}", longest) : fmt::format("{} to {}", shortest, longest);
+  description.lines.push_back(fmt::format("  {}: exposed for {} ms", files.camera, range));
+  description.json["exposure_ms"][files.camera] = files.exposure_ms;
+}
+
 }  // namespace
 
 void Description::add(const std::string& key, const Description& part) {
@@ -83,6 +92,8 @@ Description describe_capture(const Capture& capture, std::span<const Frames> fra
                                              {"bit_depth", sequence.bit_depth},
                                              {"dropped", dropped}});
   }
+  for (const SequenceFiles& files : capture.sequences)
+    if (!files.exposure_ms.empty()) add_exposures(files, description);
   if (!capture.notes.empty()) description.lines.push_back("  notes: " + capture.notes);
   if (!capture.scan) description.lines.emplace_back("  no scan: the surface can be measured, but no page made");
   return description;

@@ -17,6 +17,21 @@ int height_of(const GrayImage& image) {
   return std::visit([](const auto& pixels) { return pixels.height(); }, image);
 }
 
+std::vector<double> relative_exposures(std::span<const double> pattern, int count) {
+  if (pattern.empty()) return {};
+  const auto [shortest, longest] = std::ranges::minmax(pattern);
+  if (shortest == longest) return {};
+  std::vector<double> exposures;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
+    exposures.push_back(pattern[i % pattern.size()] / longest);
+  return exposures;
+}
+
+Frames::Frames(Sequence sequence) : sequence_(std::move(sequence)), images_(static_cast<std::size_t>(sequence_.count)) {
+  if (!sequence_.exposures.empty() && sequence_.exposures.size() != images_.size())
+    throw std::invalid_argument("Frames: there must be one exposure a frame, or none");
+}
+
 int Frames::dropped() const {
   return static_cast<int>(std::count_if(images_.begin(), images_.end(), [](const auto& image) { return !image; }));
 }
@@ -39,12 +54,13 @@ void Frames::read_row(int y, Image<float>& samples) const {
       std::fill(out.begin(), out.end(), std::numeric_limits<float>::quiet_NaN());
       continue;
     }
+    const auto scale = static_cast<float>(1 / sequence_.exposure(i));
     std::visit(
         [&](const auto& image) {
           const auto in = image.row(y);
           for (std::size_t x = 0; x < in.size(); ++x) {
             const auto gray = static_cast<float>(in[x]);
-            out[x] = gray >= clipped ? infinity : gray - black;
+            out[x] = gray >= clipped ? infinity : scale * (gray - black);
           }
         },
         frame(i));
@@ -54,15 +70,16 @@ void Frames::read_row(int y, Image<float>& samples) const {
 Image<float> brightest(const Frames& frames) {
   Image<float> picture(frames.width(), frames.height());
   const auto& sequence = frames.sequence();
-  const auto clipped = static_cast<float>(sequence.saturation - sequence.black_level);
   parallel_rows(frames.height(), [&](int y) {
     Image<float> samples;
     frames.read_row(y, samples);
     const auto out = picture.row(y);
-    for (int i = 0; i < frames.count(); ++i)
+    for (int i = 0; i < frames.count(); ++i) {
+      const auto clipped = static_cast<float>((sequence.saturation - sequence.black_level) / sequence.exposure(i));
       for (int x = 0; x < frames.width(); ++x)  // a dropped frame's NaN is never the greater one
         if (const float gray = std::min(samples(x, i), clipped); gray > out[static_cast<std::size_t>(x)])
           out[static_cast<std::size_t>(x)] = gray;
+    }
   });
   return picture;
 }

@@ -28,14 +28,23 @@ struct Sequence {
   int bit_depth = 8;        ///< of the gray values: 1 to 16
   double black_level = 0;   ///< gray value without light
   double saturation = 255;  ///< first gray value that is clipped
+  /// Exposure of each frame relative to the longest one: above 0, at most 1. Empty: all alike.
+  std::vector<double> exposures = {};
+
+  double exposure(int i) const { return exposures.empty() ? 1 : exposures[static_cast<std::size_t>(i)]; }
 };
+
+/// The exposure of each of `count` frames relative to the longest one.
+/// \param pattern  exposures in any unit, repeated from frame 0 on
+/// \return  empty if all are alike
+std::vector<double> relative_exposures(std::span<const double> pattern, int count);
 
 /// The frames of one camera. frame(i) was exposed at time i [frames]; a dropped frame is absent.
 class Frames {
  public:
   Frames() = default;
-  explicit Frames(Sequence sequence)
-      : sequence_(std::move(sequence)), images_(static_cast<std::size_t>(sequence_.count)) {}
+  /// \throws std::invalid_argument  if there are exposures, but not one a frame
+  explicit Frames(Sequence sequence);
 
   const Sequence& sequence() const { return sequence_; }
   int width() const { return sequence_.width; }
@@ -47,9 +56,10 @@ class Frames {
   void set(int i, GrayImage image);
   const GrayImage& frame(int i) const { return *images_[static_cast<std::size_t>(i)]; }
 
-  /// The gray value sequences of a row of pixels, black level removed: samples(x, i) is pixel (x, y) at
-  /// frame i, NaN where the frame was dropped. A sample that is clipped is +infinity: it says "at least
-  /// saturation" and nothing more, and no station can mistake it for a measurement (eq. 10).
+  /// The gray value sequences of a row of pixels, black level removed and divided by the frame's relative exposure:
+  /// samples(x, i) is what pixel (x, y) would show at frame i with the longest exposure and no limit, NaN where the
+  /// frame was dropped. A sample that is clipped is +infinity: it says "at least saturation" and nothing more, and no
+  /// station can mistake it for a measurement (eq. 10).
   /// \param samples  count() rows of width() pixels
   void read_row(int y, Image<float>& samples) const;
 
@@ -58,7 +68,7 @@ class Frames {
   std::vector<std::optional<GrayImage>> images_;
 };
 
-/// The brightest gray value of each pixel over all frames, black level removed, clipped ones at saturation: the picture
+/// The brightest sample of each pixel over all frames as read_row() has them, clipped ones at saturation: the picture
 /// in which a sweep shows the whole page lit (paper Fig. 4).
 Image<float> brightest(const Frames& frames);
 

@@ -43,6 +43,33 @@ TEST(Frames, CountsTheFramesInWhichAPixelIsClipped) {
   EXPECT_EQ(counts(1, 0), 2);
 }
 
+TEST(Frames, SamplesOfAllExposuresAreWhatTheLongestWouldShow) {
+  Frames frames({.camera = "cam1",
+                 .width = 1,
+                 .height = 1,
+                 .count = 3,
+                 .black_level = 2,
+                 .saturation = 250,
+                 .exposures = relative_exposures(std::vector{2.0, 8.0}, 3)});
+  frames.set(0, Image<std::uint8_t>(1, 1, 27));
+  frames.set(1, Image<std::uint8_t>(1, 1, 102));
+  frames.set(2, Image<std::uint8_t>(1, 1, 250));
+  Image<float> samples;
+  frames.read_row(0, samples);
+  EXPECT_EQ(samples(0, 0), 100);
+  EXPECT_EQ(samples(0, 1), 100);
+  EXPECT_TRUE(std::isinf(samples(0, 2))) << "clipped";
+  EXPECT_EQ(brightest(frames)(0, 0), 4 * 248);
+}
+
+TEST(Frames, ExposuresAreRelativeToTheLongestAndRepeat) {
+  EXPECT_EQ(relative_exposures(std::vector{1.0, 4.0}, 5), (std::vector{0.25, 1.0, 0.25, 1.0, 0.25}));
+  EXPECT_TRUE(relative_exposures(std::vector{3.0}, 5).empty());
+  EXPECT_TRUE(relative_exposures(std::vector{3.0, 3.0}, 5).empty());
+  EXPECT_TRUE(relative_exposures({}, 5).empty());
+  EXPECT_THROW(Frames({.camera = "cam1", .count = 3, .exposures = {1, 0.5}}), std::invalid_argument);
+}
+
 TEST(Frames, RefuseAFrameThatDoesNotFit) {
   Frames frames({.camera = "cam1", .width = 2, .height = 1, .count = 1});
   EXPECT_THROW(frames.set(0, Image<std::uint8_t>(3, 1)), std::invalid_argument);

@@ -18,6 +18,7 @@ namespace {
 constexpr int most_frames = 100'000;     ///< a sweep has hundreds
 constexpr int highest_number = 1 << 30;  ///< first + count stays an int
 constexpr int most_digits = 12;
+constexpr double most_exposure_ratio = 1e4;  ///< beyond it is a mistake of units, or a frame without use
 
 /// A frame path cut at its one %d or %06d.
 struct FramePattern {
@@ -49,6 +50,29 @@ std::filesystem::path read_path(const JsonReader& json) {
   return path;
 }
 
+double read_exposure(const JsonReader& json) {
+  const double exposure_ms = json.number();
+  if (!(exposure_ms > 0)) throw json.error(fmt::format("expected a time above 0, found {}", exposure_ms));
+  return exposure_ms;
+}
+
+/// One number for all frames, or a list for each of them or to be repeated. A list that is nearly as long as the
+/// sequence is a mistake.
+std::vector<double> read_exposures(const JsonReader& json, int count) {
+  if (!json.is_array()) return {read_exposure(json)};
+  std::vector<double> exposures;
+  for (const JsonReader& item : json.items()) exposures.push_back(read_exposure(item));
+  const auto frames = static_cast<std::size_t>(count);
+  if (exposures.empty() || (exposures.size() != frames && exposures.size() > frames / 2))
+    throw json.error(fmt::format("expected one time a frame ({}), or 1 to {} that repeat, found {}", count, count / 2,
+                                 exposures.size()));
+  const auto [shortest, longest] = std::ranges::minmax(exposures);
+  if (longest > most_exposure_ratio * shortest)
+    throw json.error(fmt::format("expected times of which none is more than {} times another, found {} and {}",
+                                 most_exposure_ratio, shortest, longest));
+  return exposures;
+}
+
 SequenceFiles read_sequence(const JsonReader& json) {
   SequenceFiles files;
   files.camera = json.at("camera").text();
@@ -67,6 +91,7 @@ SequenceFiles read_sequence(const JsonReader& json) {
   if (!(files.saturation > files.black_level))
     throw json.at("saturation")
         .error(fmt::format("expected more than black_level ({}), found {}", files.black_level, files.saturation));
+  if (const auto exposure = json.find("exposure_ms")) files.exposure_ms = read_exposures(*exposure, files.count);
   return files;
 }
 
@@ -129,6 +154,8 @@ void write_capture(const Capture& capture) {
                                  {"bit_depth", files.bit_depth},
                                  {"black_level", files.black_level},
                                  {"saturation", files.saturation}});
+    if (files.exposure_ms.size() == 1) json["sequences"].back()["exposure_ms"] = files.exposure_ms.front();
+    if (files.exposure_ms.size() > 1) json["sequences"].back()["exposure_ms"] = files.exposure_ms;
   }
   if (capture.scan) json["scan"] = {{"image", capture.scan->generic_string()}};
   if (!capture.notes.empty()) json["notes"] = capture.notes;

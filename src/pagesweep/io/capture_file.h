@@ -21,6 +21,8 @@ struct SequenceFiles {
   int bit_depth = 8;        ///< of the gray values: 1 to 16
   double black_level = 0;   ///< gray value without light
   double saturation = 255;  ///< first gray value that is clipped
+  /// Exposure times from frame 0 on: one a frame, or fewer that repeat. Empty: not known, and all alike.
+  std::vector<double> exposure_ms = {};
 };
 
 /// A recorded sweep (docs/formats.md, "Capture"). Its paths are as given: absolute, or relative to `folder`.

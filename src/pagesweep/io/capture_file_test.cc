@@ -197,6 +197,47 @@ TEST(CaptureFile, NamesFileFieldAndWhatWasExpected) {
   EXPECT_THAT(error_of([&] { read_capture(folder / "nowhere"); }), HasSubstr("nowhere: cannot be read"));
 }
 
+TEST(CaptureFile, KeepsExposuresAndRepeatsThem) {
+  const TestFolder folder;
+  Capture capture = make_capture(folder);
+  capture.sequences[0].exposure_ms = {2, 8};
+  capture.sequences[1].exposure_ms = {4};
+  write_capture(capture);
+  const Capture back = read_capture(folder.path());
+  EXPECT_EQ(back.sequences[0].exposure_ms, (std::vector{2.0, 8.0}));
+  EXPECT_EQ(back.sequences[1].exposure_ms, std::vector{4.0});
+  const auto frames = read_frames(back);
+  EXPECT_EQ(frames[0].sequence().exposure(0), 0.25);
+  EXPECT_EQ(frames[0].sequence().exposure(frame_count - 1), 1);
+  EXPECT_EQ(frames[1].sequence().exposure(0), 1);
+}
+
+TEST(CaptureFile, RefusesExposuresThatAreNone) {
+  const TestFolder folder;
+  make_capture(folder);
+  const std::string sound = read_text(folder / "capture.json");
+  const std::string all_but_one = "[1" + [] {
+    std::string rest;
+    for (int i = 2; i < frame_count; ++i) rest += ", 2";
+    return rest;
+  }() + "]";
+  const std::tuple<std::string, std::string, std::string> damages[] = {
+      {"0", "exposure_ms", "a time above 0"},
+      {"-3", "exposure_ms", "a time above 0"},
+      {"\"4 ms\"", "exposure_ms", "expected a number, found a string"},
+      {"[2, 0]", "exposure_ms[1]", "a time above 0"},
+      {"[]", "exposure_ms", "one time a frame (20), or 1 to 10 that repeat, found 0"},
+      {all_but_one, "exposure_ms", "or 1 to 10 that repeat, found 19"},
+      {"[0.001, 80]", "exposure_ms", "none is more than 10000 times another"},
+  };
+  for (const auto& [value, place, hint] : damages) {
+    test::put(folder / "capture.json", replaced(sound, "\"count\": 20", "\"count\": 20, \"exposure_ms\": " + value));
+    EXPECT_THAT(error_of([&] { read_capture(folder.path()); }),
+                AllOf(HasSubstr("capture.json: sequences[0]." + place + ": "), HasSubstr(hint)))
+        << value;
+  }
+}
+
 TEST(CaptureFile, NumbersFramesWithAndWithoutPadding) {
   Capture capture;
   capture.folder = "here";

@@ -114,7 +114,8 @@ class FolderSource : public FrameSource {
 }  // namespace
 
 Sequence make_sequence(const SequenceFiles& files, const Camera& camera) {
-  return {files.camera, camera.width, camera.height, files.count, files.bit_depth, files.black_level, files.saturation};
+  return {files.camera,    camera.width,      camera.height,    files.count,
+          files.bit_depth, files.black_level, files.saturation, relative_exposures(files.exposure_ms, files.count)};
 }
 
 std::unique_ptr<FrameSource> open_capture(const Capture& capture, const Rig& rig) {

@@ -116,6 +116,8 @@ std::vector<JsonReader> JsonReader::items() const {
   return items;
 }
 
+bool JsonReader::is_array() const { return value_at(value_).is_array(); }
+
 std::string JsonReader::text() const {
   const json& value = value_at(value_);
   if (!value.is_string()) throw unexpected("a string");

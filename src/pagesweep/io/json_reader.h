@@ -33,6 +33,7 @@ class JsonReader {
   JsonReader at(std::string_view name) const;                   ///< the field of that name
   std::optional<JsonReader> find(std::string_view name) const;  ///< likewise; nothing if it is absent or null
   std::vector<JsonReader> items() const;                        ///< of an array
+  bool is_array() const;                                        ///< where a field may be one or several
   std::string text() const;
   bool boolean() const;
   int integer(int lowest, int highest) const;
