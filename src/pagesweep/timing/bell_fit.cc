@@ -36,7 +36,7 @@ struct Step {
 template <int N>
 class Fitter {
  public:
-  Fitter(std::span<const float> gray, int first_frame, const StripeProfile& profile, const SensorNoise& noise,
+  Fitter(std::span<const float> gray, int first_frame, const StripeProfile& profile, const FrameNoise& noise,
          const Bell& start, const BellFitOptions& options)
       : gray_(gray), first_frame_(first_frame), profile_(profile), noise_(noise), start_(start), options_(options) {}
 
@@ -81,9 +81,10 @@ class Fitter {
         j[3] = after;
         j[4] = after * after;
       }
-      const double precision = 1 / noise_.variance(model);
+      const SensorNoise& noise = noise_.at(first_frame_ + static_cast<int>(k));
+      const double precision = 1 / noise.variance(model);
       if (std::isinf(gray)) {
-        add_clipped(step, j, model, precision);
+        add_clipped(step, j, model - noise.ceiling, precision);
         continue;
       }
       const double residual = gray - model;
@@ -99,9 +100,10 @@ class Fitter {
     return step;
   }
 
-  void add_clipped(Step<N>& step, const double (&j)[N], double model, double precision) const {
+  /// \param excess  of the model over the ceiling [gray values]
+  static void add_clipped(Step<N>& step, const double (&j)[N], double excess, double precision) {
     const double root = std::sqrt(precision);
-    const double z = (model - noise_.ceiling) * root;
+    const double z = excess * root;
     if (z > 5) return;  // it had to be clipped and tells nothing
     const double ratio = inverse_mills_ratio(z);
     step.add(j, ratio * (ratio + z) * precision, ratio * root);
@@ -127,14 +129,14 @@ class Fitter {
   std::span<const float> gray_;
   int first_frame_;
   const StripeProfile& profile_;
-  const SensorNoise& noise_;
+  const FrameNoise& noise_;
   const Bell start_;
   const BellFitOptions& options_;
 };
 
 }  // namespace
 
-BellFit fit_bell(std::span<const float> gray, int first_frame, const StripeProfile& profile, const SensorNoise& noise,
+BellFit fit_bell(std::span<const float> gray, int first_frame, const StripeProfile& profile, const FrameNoise& noise,
                  const Bell& start, const BellFitOptions& options) {
   switch (options.unknowns) {
     case BellUnknowns::width:

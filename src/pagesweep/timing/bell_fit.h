@@ -59,14 +59,15 @@ struct BellFit {
 };
 
 /// Maximum likelihood estimate of a bell: Gauss-Newton steps on
-///     sum over samples (gray_i - model_i)^2 / variance(model_i)  +  clipped samples as "at least noise.ceiling",
+///     sum over samples (gray_i - model_i)^2 / variance_i(model_i)  +  clipped samples as "at least ceiling_i",
 /// the variances renewed from the model at every step, so that noise does not choose its own weight. A clipped sample
 /// contributes log Phi((model - ceiling) / sigma) (Tobin 1958): nothing where the model is far above the ceiling,
 /// and near it what keeps the neighbouring samples, unclipped by luck, from a bias.
 /// \param gray         consecutive samples; NaN: dropped, +infinity: clipped
 /// \param first_frame  time of gray[0]
+/// \param noise        of the frames
 /// \param start        within about half a stripe's width of the truth
-BellFit fit_bell(std::span<const float> gray, int first_frame, const StripeProfile& profile, const SensorNoise& noise,
+BellFit fit_bell(std::span<const float> gray, int first_frame, const StripeProfile& profile, const FrameNoise& noise,
                  const Bell& start, const BellFitOptions& options = {});
 
 /// d gray / d (amplitude, background, time, log width) at a frame, for a bell on an even background.

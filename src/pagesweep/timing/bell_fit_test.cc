@@ -51,7 +51,7 @@ TEST(FitBell, FindsWhatMadeTheSamples) {
   const auto gray = sample(skewed_profile, truth, 60);
   for (const double off : {-3.0, 0.0, 3.0}) {
     const Bell start{.amplitude = 100, .background = 0, .time = truth.time + off};
-    const BellFit fit = fit_bell(gray, 0, skewed_profile, {}, start);
+    const BellFit fit = fit_bell(gray, 0, skewed_profile, SensorNoise{}, start);
     EXPECT_TRUE(fit.converged);
     EXPECT_NEAR(fit.bell.time, truth.time, 1e-5);
     EXPECT_NEAR(fit.bell.amplitude, truth.amplitude, 1e-3);
@@ -63,13 +63,13 @@ TEST(FitBell, FindsWhatMadeTheSamples) {
 TEST(FitBell, FindsTheWidthAndACurvedBackground) {
   Bell truth{.amplitude = 130, .background = 7, .time = 24.37, .width = 1.12};
   const Bell start{.amplitude = 100, .time = 24};
-  const BellFit wide = fit_bell(sample(skewed_profile, truth, 60), 0, skewed_profile, {}, start,
+  const BellFit wide = fit_bell(sample(skewed_profile, truth, 60), 0, skewed_profile, SensorNoise{}, start,
                                 {.unknowns = BellUnknowns::width, .log_width_sigma = 100});
   EXPECT_TRUE(wide.converged);
   EXPECT_NEAR(wide.bell.width, truth.width, 1e-5);
   EXPECT_NEAR(wide.bell.time, truth.time, 1e-5);
   truth = {.amplitude = 130, .background = 17, .time = 24.37, .width = 1, .slope = 0.5, .curvature = -0.01};
-  const BellFit curved = fit_bell(sample(skewed_profile, truth, 60), 0, skewed_profile, {}, start,
+  const BellFit curved = fit_bell(sample(skewed_profile, truth, 60), 0, skewed_profile, SensorNoise{}, start,
                                   {.unknowns = BellUnknowns::curved_background});
   EXPECT_TRUE(curved.converged);
   EXPECT_NEAR(curved.bell.time, truth.time, 1e-4);

@@ -58,14 +58,16 @@ TimeMap estimate_times(const Frames& frames, const StripeProfile& profile, const
                        const StripeWidths& widths, const TimingOptions& options, Progress& progress) {
   SensorNoise seen = noise;
   if (options.use_saturated) seen.ceiling = std::numeric_limits<double>::infinity();
-  const PixelJudge judge{
-      profile, seen, frames.count(), options.min_amplitude, options.max_sigma, !options.use_saturated};
+  const std::vector<double>& exposures = frames.sequence().exposures;
+  const FrameNoise frame_noise(noise, exposures);
+  const PixelJudge judge{profile,           FrameNoise(seen, exposures), frames.count(), options.min_amplitude,
+                         options.max_sigma, !options.use_saturated};
   TimeMap map(frames.width(), frames.height());
   constexpr int rows_a_step = 64, rows_a_range = 4;
   for (int first = 0; first < frames.height(); first += rows_a_step) {
     const int rows = std::min(rows_a_step, frames.height() - first);
     parallel_ranges(rows, rows_a_range, [&](int begin, int end) {
-      RowWindows row(frames, profile, noise, options.use_saturated);
+      RowWindows row(frames, profile, frame_noise, options.use_saturated);
       for (int y = first + begin; y < first + end; ++y) estimate_row(row, y, judge, widths, options, map);
     });
     progress.advance(static_cast<double>(first + rows) / frames.height());

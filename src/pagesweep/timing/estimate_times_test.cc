@@ -23,11 +23,12 @@ struct Scene {
   Pixel tested{};
   double time_per_row = 0.013;
   std::vector<int> dropped{};
+  double paper_amplitude = 200;
 
   static bool is_paper(int y) { return y % 4 == 0; }
   Pixel pixel(int x, int y) const {
     Pixel pixel = tested;
-    if (is_paper(y)) pixel.amplitude = 200;
+    if (is_paper(y)) pixel.amplitude = paper_amplitude;
     pixel.time = 60 + 2.0 * x / width + time_per_row * y;
     return pixel;
   }
@@ -172,6 +173,64 @@ TEST(EstimateTimes, LearnsFromTheFlanksWhereEverythingIsClipped) {
   const Score result = score(scene, map);
   EXPECT_LT(result.error, 1.2);
   EXPECT_GT(result.measured, 0.99);
+}
+
+// Even frames are exposed for a sixth: white paper is measured by them and clipped in the others, which measure ink.
+const Sensor two_exposures{.gain = 0.02, .read_noise = 1.2, .exposures = {1.0 / 6, 1}};
+
+TEST(EstimateTimes, TwoExposuresTogetherReachTheirOwnBound) {
+  // Ink, gray, paper that the long exposure clips, and as bright as the short one takes.
+  for (const double amplitude : {15.0, 60.0, 180.0, 700.0, 1400.0}) {
+    SCOPED_TRACE(amplitude);
+    Scene scene{.sensor = two_exposures, .tested = {.amplitude = amplitude}, .paper_amplitude = 1200};
+    const Timing timing = [&] {
+      const Frames frames = scene.frames();
+      return estimate_times({&frames, 1});
+    }();
+    const TimeMap& map = timing.maps[0];
+    const Score result = score(scene, map, origin_of(scene, map));
+    EXPECT_LT(result.error, 1.05);
+    EXPECT_LT(result.phase_bias, 0.15);
+    EXPECT_NEAR(result.normalised, 1, 0.12);
+    EXPECT_NEAR(result.residual, 1, 0.06);
+    EXPECT_GT(result.measured, 0.999);
+    EXPECT_NEAR(timing.noise[0].gain, scene.sensor.gain, 0.1 * scene.sensor.gain);
+    EXPECT_NEAR(timing.noise[0].read_variance, scene.sensor.variance(0), 0.1 * scene.sensor.variance(0));
+  }
+}
+
+TEST(EstimateTimes, TwoExposuresGainOnInkWhatTheShortOneAloneLoses) {
+  const Pixel ink{.amplitude = 15}, paper{.amplitude = 1200};
+  const auto bound = [](const Pixel& pixel, const std::vector<double>& exposures) {
+    Sensor sensor = two_exposures;
+    sensor.exposures = exposures;
+    return testing::cramer_rao_bound(testing::gaussian(4), pixel, sensor, count);
+  };
+  // Half the frames measure ink six times as strongly; read noise hardly depends on the exposure.
+  EXPECT_GT(bound(ink, {1.0 / 6}) / bound(ink, {1.0 / 6, 1}), 3.5);
+  // Paper loses the half of its samples near the top, and gets those at the feet that the long exposure sees.
+  EXPECT_LT(bound(paper, {1.0 / 6, 1}) / bound(paper, {1.0 / 6}), std::sqrt(2));
+}
+
+TEST(EstimateTimes, BothExposuresMayBeClipped) {
+  const Scene scene{.sensor = two_exposures, .tested = {.amplitude = 4000}, .paper_amplitude = 1200};
+  const TimeMap map = measure(scene);
+  const Score result = score(scene, map, origin_of(scene, map));
+  EXPECT_LT(result.error, 1.1);
+  EXPECT_GT(result.measured, 0.999);
+}
+
+TEST(EstimateTimes, EqualExposuresChangeNothing) {
+  Scene scene{.tested = {.amplitude = 300}};
+  const TimeMap unknown = measure(scene);
+  Frames frames = scene.frames();
+  Sequence sequence = frames.sequence();
+  sequence.exposures.assign(count, 1.0);
+  Frames known(sequence);
+  for (int i = 0; i < count; ++i) known.set(i, frames.frame(i));
+  const TimeMap map = std::move(estimate_times({&known, 1}).maps[0]);
+  EXPECT_TRUE(std::ranges::equal(map.time.pixels(), unknown.time.pixels()));
+  EXPECT_TRUE(std::ranges::equal(map.sigma.pixels(), unknown.sigma.pixels()));
 }
 
 TEST(EstimateTimes, FollowsAWidthThatChangesOverThePicture) {

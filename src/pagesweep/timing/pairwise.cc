@@ -18,8 +18,9 @@ constexpr int paper_interval = 30;  // [frames] of the paper's Fig. 4
 float sample_at(const Frames& frames, int x, int y, int i, bool keep_clipped) {
   if (!frames.has(i)) return not_a_number;
   const double gray = std::visit([&](const auto& image) { return static_cast<double>(image(x, y)); }, frames.frame(i));
-  if (gray >= frames.sequence().saturation && !keep_clipped) return std::numeric_limits<float>::infinity();
-  return static_cast<float>(gray - frames.sequence().black_level);
+  const Sequence& sequence = frames.sequence();
+  if (gray >= sequence.saturation && !keep_clipped) return std::numeric_limits<float>::infinity();
+  return static_cast<float>((gray - sequence.black_level) / sequence.exposure(i));
 }
 
 /// Gray value between four pixels; not finite if one of them is not (0 times infinity is NaN: no measurement either).
@@ -101,9 +102,10 @@ Correspondences shift_pairwise(const Correspondences& matches, const Frames& fro
       from.read_row(y, samples);
       for (int x = 0; x < matches.width(); ++x) {
         if (matches.status(x, y) != PixelStatus::ok) continue;
-        const auto naive = static_cast<float>(from.sequence().saturation - from.sequence().black_level);
+        const double highest = from.sequence().saturation - from.sequence().black_level;
         for (int i = 0; i < from.count(); ++i) {
           const float gray = samples(x, i);
+          const auto naive = static_cast<float>(highest / from.sequence().exposure(i));
           f[static_cast<std::size_t>(i)] = options.use_saturated && std::isinf(gray) ? naive : gray;
         }
         shift_match(shifted, x, y, f, to, to_times, options.use_saturated, g);

@@ -38,19 +38,26 @@ std::array<Flank, 2> examine_flanks(const PixelWindow& window, const Bell& bell,
   return flanks;
 }
 
-/// Rms residual around the bell's middle [gray values].
-double core_misfit(const PixelWindow& window, const Bell& bell, const PixelJudge& judge) {
+/// Whether the residuals around the bell's middle exceed both three standard deviations of noise and `most` of its
+/// height.
+bool misfits(const PixelWindow& window, const Bell& bell, const PixelJudge& judge, double most) {
   const double reach = 0.75 * judge.profile.full_width_half_maximum();
-  double squares = 0;
+  double squares = 0, weights = 0;
   int samples = 0;
   for (std::size_t k = 0; k < window.gray.size(); ++k) {
     const double frame = window.first_frame + static_cast<double>(k);
     if (std::abs(frame - bell.time) > reach * bell.width || !std::isfinite(window.gray[k])) continue;
     const double residual = window.gray[k] - bell.gray_at(frame, judge.profile);
-    squares += residual * residual;
+    const double weight = judge.noise.weight(window.first_frame + static_cast<int>(k));
+    squares += weight * residual * residual;
+    weights += weight;
     ++samples;
   }
-  return samples > 0 ? std::sqrt(squares / samples) : 0;
+  if (samples == 0) return false;
+  const double misfit = std::sqrt(squares / weights);
+  // Times its weight, a sample's variance is at most that of the longest exposure.
+  const double variance = judge.noise.sensor().variance(bell.background + bell.amplitude) * (samples / weights);
+  return misfit > 3 * std::sqrt(variance) && misfit > most * bell.amplitude;
 }
 
 /// Reduced chi square beyond which noise cannot be the reason any more: four standard deviations.
@@ -95,8 +102,9 @@ PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma
   constexpr double least_amplitude = 3;  // [gray values] below that, rounding makes the shape
   if (!std::isfinite(bell.time) || !std::isfinite(sigma)) return PixelStatus::bad_fit;
   // 0.75 times the width at half height: sum of the squared profile of any bell-like stripe.
-  const double light = 0.75 * judge.profile.full_width_half_maximum() * bell.width;
-  if (bell.amplitude < 5 * std::sqrt(judge.noise.variance(bell.background) / light)) return PixelStatus::too_dark;
+  const double light = 0.75 * judge.profile.full_width_half_maximum() * bell.width * judge.noise.mean_weight();
+  if (bell.amplitude < 5 * std::sqrt(judge.noise.sensor().variance(bell.background) / light))
+    return PixelStatus::too_dark;
   if (bell.time < 0 || bell.time > judge.frame_count - 1) return PixelStatus::truncated;
   const auto flanks = examine_flanks(window, bell, judge);
   for (const Flank& flank : flanks)
@@ -107,19 +115,18 @@ PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma
   if (bell.amplitude < std::max(judge.min_amplitude, least_amplitude) || sigma > judge.max_sigma)
     return PixelStatus::too_dark;
   if (!judge.refuse_misfits) return PixelStatus::ok;
-  const double noise = std::sqrt(judge.noise.variance(bell.background + bell.amplitude));
-  const double misfit = core_misfit(window, bell, judge);
-  return misfit > 3 * noise && misfit > most_misfit * bell.amplitude ? PixelStatus::bad_fit : PixelStatus::ok;
+  return misfits(window, bell, judge, most_misfit) ? PixelStatus::bad_fit : PixelStatus::ok;
 }
 
 PixelTime time_by_center_of_mass(const PixelWindow& window, const PixelJudge& judge) {
   Bell bell = window.start;
-  const auto ceiling = static_cast<float>(judge.noise.ceiling);
   // Background: mean of what lies outside the profile's support.
   double outside = 0, background = 0, highest = 0;
   const auto time_of = [&](std::size_t k) { return window.first_frame + static_cast<double>(k); };
+  const auto noise_of = [&](std::size_t k) { return judge.noise.at(window.first_frame + static_cast<int>(k)); };
+  const auto gray_of = [&](std::size_t k) { return std::min(window.gray[k], static_cast<float>(noise_of(k).ceiling)); };
   for (std::size_t k = 0; k < window.gray.size(); ++k) {
-    const double gray = std::min(window.gray[k], ceiling);
+    const double gray = gray_of(k);
     if (std::isnan(window.gray[k])) continue;
     highest = std::max(highest, gray);
     if (std::abs(time_of(k) - bell.time) < 0.8 * judge.profile.end() * bell.width) continue;
@@ -133,14 +140,14 @@ PixelTime time_by_center_of_mass(const PixelWindow& window, const PixelJudge& ju
   for (int pass = 0; pass < 2; ++pass) {
     if (pass == 1) bell.time = moment / mass;
     for (std::size_t k = 0; k < window.gray.size(); ++k) {
-      const double gray = std::min(window.gray[k], ceiling);
+      const double gray = gray_of(k);
       if (!(gray > threshold) || std::isnan(window.gray[k])) continue;
       if (pass == 0) {
         mass += gray - threshold;
         moment += (gray - threshold) * time_of(k);
       } else {
         const double lever = (time_of(k) - bell.time) / mass;
-        scatter += lever * lever * judge.noise.variance(gray);
+        scatter += lever * lever * noise_of(k).variance(gray);
       }
     }
     if (!(mass > 0)) return {};
@@ -169,7 +176,7 @@ PixelTime time_by_shift(const PixelWindow& window, const PixelJudge& judge) {
     return unsolved;
   }
   const Bell bell{shift->a, shift->b, shift->c + window.first_frame + before, width};
-  const double noise = std::sqrt(judge.noise.variance(bell.background + 0.5 * bell.amplitude));
+  const double noise = std::sqrt(judge.noise.sensor().variance(bell.background + 0.5 * bell.amplitude));
   // What the noise alone would leave. Eq. 9's own residuals know less: the noise in its matrix passes for slope.
   const BellFit at_bell =
       fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, bell, {.most_iterations = 1});

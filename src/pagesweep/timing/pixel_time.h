@@ -19,7 +19,7 @@ struct PixelTime {
 /// All that is the same for every pixel of a camera.
 struct PixelJudge {
   const StripeProfile& profile;
-  SensorNoise noise;
+  FrameNoise noise;
   int frame_count = 0;
   double min_amplitude = 0;    ///< [gray values]
   double max_sigma = 0.5;      ///< [frames]

@@ -7,7 +7,7 @@
 
 namespace pagesweep {
 
-RowWindows::RowWindows(const Frames& frames, const StripeProfile& profile, const SensorNoise& noise, bool keep_clipped)
+RowWindows::RowWindows(const Frames& frames, const StripeProfile& profile, const FrameNoise& noise, bool keep_clipped)
     : frames_(frames),
       profile_(profile),
       noise_(noise),
@@ -18,19 +18,19 @@ RowWindows::RowWindows(const Frames& frames, const StripeProfile& profile, const
 
 void RowWindows::read(int y) {
   frames_.read_row(y, samples_);
-  search_.find(samples_, static_cast<float>(noise_.ceiling));
+  search_.find(samples_, noise_);
 }
 
 PixelWindow RowWindows::window_at(int x, double width, int centre) {
   const int reach = static_cast<int>(std::ceil(reach_ * width));
   const int begin = std::max(0, centre - reach), end = std::min(frames_.count(), centre + reach + 1);
-  const auto naive = static_cast<float>(noise_.ceiling + 0.5);
   gray_.clear();
   float lowest = std::numeric_limits<float>::infinity();
   for (int i = begin; i < end; ++i) {
     const float gray = samples_(x, i);
     lowest = gray < lowest ? gray : lowest;
-    gray_.push_back(keep_clipped_ && std::isinf(gray) ? naive : gray);
+    const bool is_naive = keep_clipped_ && std::isinf(gray);
+    gray_.push_back(is_naive ? static_cast<float>((noise_.sensor().ceiling + 0.5) / noise_.exposure(i)) : gray);
   }
   PixelWindow window{gray_, begin, {}};
   window.start.background = std::isfinite(lowest) ? lowest : 0;
@@ -42,17 +42,22 @@ PixelWindow RowWindows::window_at(int x, double width, int centre) {
 
 double RowWindows::start_amplitude(const PixelWindow& window, double width) const {
   float highest = 0;
+  for (const float gray : window.gray) highest = std::isfinite(gray) && gray > highest ? gray : highest;
+  // A longer exposure that was clipped below what a shorter one saw tells nothing.
   int clipped = 0;
-  for (const float gray : window.gray) {
-    clipped += std::isinf(gray);
-    highest = std::isfinite(gray) && gray > highest ? gray : highest;
+  double ceiling = noise_.sensor().ceiling;
+  for (std::size_t k = 0; k < window.gray.size(); ++k) {
+    const double own = noise_.at(window.first_frame + static_cast<int>(k)).ceiling;
+    if (!std::isinf(window.gray[k]) || own + 0.5 < highest) continue;
+    ceiling = std::max(ceiling, own);
+    ++clipped;
   }
   const double seen = std::max(highest - window.start.background, 1.0);
   if (clipped == 0) return seen;
   // The longer the plateau, the higher the bell must be that was cut off there.
   const double end = 0.5 * (clipped + 1) / width;
   const double cut_at = std::max(0.5 * (profile_.value(-end) + profile_.value(end)), 0.02);
-  return std::max(seen, (noise_.ceiling - window.start.background) / cut_at);
+  return std::max(seen, (ceiling - window.start.background) / cut_at);
 }
 
 }  // namespace pagesweep

@@ -21,11 +21,11 @@ struct PixelWindow {
 class RowWindows {
  public:
   /// \param keep_clipped  clipped samples stay in as if the saturation level had been measured (the naive way)
-  RowWindows(const Frames& frames, const StripeProfile& profile, const SensorNoise& noise, bool keep_clipped = false);
+  RowWindows(const Frames& frames, const StripeProfile& profile, const FrameNoise& noise, bool keep_clipped = false);
 
   void read(int y);
   /// How many standard deviations the stripe search's response lies above what noise alone would give.
-  double significance(int x) const { return search_.rise(x) / search_.rise_sigma(noise_.read_variance); }
+  double significance(int x) const { return search_.rise(x) / search_.rise_sigma(noise_); }
   /// \param width  of the stripe there, relative to the profile's
   PixelWindow window(int x, double width) { return window_at(x, width, search_.frame(x)); }
   PixelWindow window_at(int x, double width, int centre);
@@ -36,7 +36,7 @@ class RowWindows {
 
   const Frames& frames_;
   const StripeProfile& profile_;
-  const SensorNoise noise_;
+  const FrameNoise& noise_;
   const bool keep_clipped_;
   double reach_;  ///< [frames] to both sides of the stripe's middle, at width 1
   StripeSearch search_;

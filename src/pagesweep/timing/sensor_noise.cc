@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace pagesweep {
@@ -60,6 +61,17 @@ SensorNoise fit_line(std::span<const Level> levels) {
 }
 
 }  // namespace
+
+FrameNoise::FrameNoise(const SensorNoise& sensor, std::vector<double> exposures)
+    : sensor_(sensor), exposures_(std::move(exposures)), highest_ceiling_(sensor.ceiling) {
+  double weights = 0;
+  for (const double e : exposures_) {
+    frames_.push_back({sensor.read_variance / (e * e), sensor.gain / e, sensor.ceiling / e});
+    weights += e * e;
+    highest_ceiling_ = std::max(highest_ceiling_, sensor.ceiling / e);
+  }
+  if (!exposures_.empty()) mean_weight_ = weights / static_cast<double>(exposures_.size());
+}
 
 SensorNoise fit_sensor_noise(std::span<const NoiseSample> samples) {
   constexpr std::size_t fewest = 50, most_bins = 24;

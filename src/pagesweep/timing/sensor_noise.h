@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <span>
+#include <vector>
 
 namespace pagesweep {
 
@@ -14,6 +16,34 @@ struct SensorNoise {
   double ceiling = std::numeric_limits<double>::infinity();  ///< [gray values] a sample is clipped from here on
 
   double variance(double gray) const { return gray > 0 ? read_variance + gain * gray : read_variance; }
+};
+
+/// The noise of each frame's samples when they are divided by the frame's relative exposure e, as Frames::read_row()
+/// does. A sensor's g = e s of variance read + gain g and ceiling c becomes s of variance read / e^2 + gain / e s and
+/// ceiling c / e: of the same form, so that a frame's noise is a SensorNoise again.
+class FrameNoise {
+ public:
+  /// \param exposures  one a frame, the longest 1; empty: all alike. See Sequence::exposures
+  FrameNoise(const SensorNoise& sensor, std::vector<double> exposures = {});  // NOLINT(*-explicit-*): the usual case
+
+  /// Of gray values as the sensor has them, which are those of the longest exposure.
+  const SensorNoise& sensor() const { return sensor_; }
+  const SensorNoise& at(int frame) const {
+    return frames_.empty() ? sensor_ : frames_[static_cast<std::size_t>(frame)];
+  }
+  double exposure(int frame) const { return exposures_.empty() ? 1 : exposures_[static_cast<std::size_t>(frame)]; }
+  /// What a frame's sample counts against noise that does not grow with light: the square of its exposure.
+  double weight(int frame) const { return exposure(frame) * exposure(frame); }
+  double mean_weight() const { return mean_weight_; }
+  double highest_ceiling() const { return highest_ceiling_; }  ///< that of the shortest exposure
+  FrameNoise with(const SensorNoise& sensor) const { return {sensor, exposures_}; }
+
+ private:
+  SensorNoise sensor_;
+  std::vector<double> exposures_;
+  std::vector<SensorNoise> frames_;
+  double mean_weight_ = 1;
+  double highest_ceiling_;
 };
 
 /// Rounding to whole gray values scatters by this much, however silent the sensor is.

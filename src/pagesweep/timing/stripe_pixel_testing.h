@@ -47,6 +47,8 @@ struct Sensor {
   double black_level = 4;   ///< [gray values]
   double saturation = 255;  ///< [gray values] first clipped one
   int bit_depth = 8;
+  std::vector<double> exposures = {1};  ///< of the frames in turn: factors of the light
+  double exposure(int i) const { return exposures[static_cast<std::size_t>(i) % exposures.size()]; }
   double variance(double light) const { return read_noise * read_noise + 1.0 / 12 + gain * std::max(light, 0.0); }
 };
 
@@ -95,7 +97,7 @@ inline std::vector<float> expose(const Shape& shape, const Pixel& pixel, const S
 }
 
 /// Smallest standard deviation [frames] that an unbiased estimate of the pixel's time can have when amplitude and
-/// background are unknown and the clipped samples and dropped frames are left out.
+/// background are unknown and the clipped samples and dropped frames are left out, whatever the frames' exposures.
 inline double cramer_rao_bound(const Shape& shape, const Pixel& pixel, const Sensor& sensor, int count,
                                const std::vector<int>& dropped = {}) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
@@ -103,10 +105,10 @@ inline double cramer_rao_bound(const Shape& shape, const Pixel& pixel, const Sen
   for (int i = 0; i < count; ++i) {
     if (std::find(dropped.begin(), dropped.end(), i) != dropped.end()) continue;
     const double t = (i - pixel.time) / pixel.width;
-    const double value = light(shape, pixel, i);
+    const double exposure = sensor.exposure(i), value = exposure * light(shape, pixel, i);
     if (value + sensor.black_level >= sensor.saturation - 0.5) continue;
     const double slope = (shape(t + h) - shape(t - h)) / (2 * h);
-    const Eigen::Vector3d row(shape(t), 1, -pixel.amplitude * slope / pixel.width);
+    const Eigen::Vector3d row = exposure * Eigen::Vector3d(shape(t), 1, -pixel.amplitude * slope / pixel.width);
     information += row * row.transpose() / sensor.variance(value);
   }
   return std::sqrt(information.inverse()(2, 2));
@@ -116,15 +118,22 @@ inline double cramer_rao_bound(const Shape& shape, const Pixel& pixel, const Sen
 inline Frames make_frames(int width, int height, int count, const Sensor& sensor,
                           const std::function<double(int x, int y, int i)>& light_at, std::uint64_t seed = 1,
                           const std::vector<int>& dropped = {}) {
-  Sequence sequence{"cam", width, height, count, sensor.bit_depth, sensor.black_level, sensor.saturation};
+  Sequence sequence{"cam",
+                    width,
+                    height,
+                    count,
+                    sensor.bit_depth,
+                    sensor.black_level,
+                    sensor.saturation,
+                    relative_exposures(sensor.exposures, count)};
   Frames frames(sequence);
   std::vector<Image<std::uint16_t>> images(static_cast<std::size_t>(count), Image<std::uint16_t>(width, height));
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const auto pixel_seed = seed * 1000003 + static_cast<std::uint64_t>(y * width + x);
       for (int i = 0; i < count; ++i)
-        images[static_cast<std::size_t>(i)](x, y) =
-            static_cast<std::uint16_t>(expose(light_at(x, y, i), sensor, pixel_seed, static_cast<std::uint64_t>(i)));
+        images[static_cast<std::size_t>(i)](x, y) = static_cast<std::uint16_t>(
+            expose(sensor.exposure(i) * light_at(x, y, i), sensor, pixel_seed, static_cast<std::uint64_t>(i)));
     }
   for (int i = 0; i < count; ++i)
     if (std::find(dropped.begin(), dropped.end(), i) == dropped.end())

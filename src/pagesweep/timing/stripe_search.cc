@@ -11,9 +11,10 @@ namespace {
 
 bool is_dropped(const Image<float>& samples, int i) { return samples.width() > 0 && std::isnan(samples(0, i)); }
 
-/// sums = before + the frame, clipped samples at the ceiling.
-void add_frame(std::span<const float> before, std::span<const float> frame, float ceiling, std::span<float> sums) {
-  for (std::size_t x = 0; x < frame.size(); ++x) sums[x] = before[x] + std::min(frame[x], ceiling);
+/// sums = before + weight * the frame, clipped samples at the ceiling.
+void add_frame(std::span<const float> before, std::span<const float> frame, float weight, float ceiling,
+               std::span<float> sums) {
+  for (std::size_t x = 0; x < frame.size(); ++x) sums[x] = before[x] + weight * std::min(frame[x], ceiling);
 }
 
 }  // namespace
@@ -22,30 +23,36 @@ StripeSearch::StripeSearch(double fwhm)
     : box_(2 * std::max(1, static_cast<int>(std::lround(0.5 * fwhm))) + 1),
       distance_(std::max(box_, static_cast<int>(std::lround(1.4 * fwhm)))) {}
 
-double StripeSearch::rise_sigma(double variance) const { return std::sqrt(1.5 * variance / box_); }
+double StripeSearch::rise_sigma(const FrameNoise& noise) const {
+  return std::sqrt(1.5 * noise.sensor().read_variance / (box_ * noise.mean_weight()));
+}
 
-void StripeSearch::find(const Image<float>& samples, float ceiling) {
+void StripeSearch::find(const Image<float>& samples, const FrameNoise& noise) {
   const auto width = static_cast<std::size_t>(samples.width());
   frame_.assign(width, 0);
   rise_.assign(width, -std::numeric_limits<float>::infinity());
-  accumulate(samples, ceiling);
+  accumulate(samples, noise);
   filter();
-  centre_clipped(samples);
+  centre_clipped(samples, noise);
 }
 
-void StripeSearch::accumulate(const Image<float>& samples, float ceiling) {
+void StripeSearch::accumulate(const Image<float>& samples, const FrameNoise& noise) {
   if (sums_.width() != samples.width() || sums_.height() != samples.height() + 1)
     sums_ = Image<float>(samples.width(), samples.height() + 1);
   std::ranges::fill(sums_.row(0), 0.0F);
+  weights_.assign(static_cast<std::size_t>(sums_.height()), 0.0F);
   for (int i = 0; i < samples.height(); ++i) {
     // A dropped frame repeats the one before: good enough to find a bell, and no estimator reads it.
     int shown = i;
     while (shown > 0 && is_dropped(samples, shown)) --shown;
     while (shown + 1 < samples.height() && is_dropped(samples, shown)) ++shown;
+    const auto weight = static_cast<float>(noise.weight(shown));
+    weights_[static_cast<std::size_t>(i) + 1] = weights_[static_cast<std::size_t>(i)] + weight;
     if (is_dropped(samples, shown))
       std::ranges::copy(sums_.row(i), sums_.row(i + 1).begin());
     else
-      add_frame(sums_.row(i), samples.row(shown), ceiling, sums_.row(i + 1));
+      add_frame(sums_.row(i), samples.row(shown), weight, static_cast<float>(noise.at(shown).ceiling),
+                sums_.row(i + 1));
   }
 }
 
@@ -54,7 +61,8 @@ void StripeSearch::filter() {
   // Beyond the recording's ends a box is cut; where nothing of it is left, the other side's stands for both.
   const auto mean_of = [&](int centre) {
     const int begin = std::clamp(centre - half, 0, count), end = std::clamp(centre + half + 1, 0, count);
-    return std::tuple{sums_.row(begin).data(), sums_.row(end).data(), end > begin ? 1.0F / float(end - begin) : 0.0F};
+    const float weight = weights_[static_cast<std::size_t>(end)] - weights_[static_cast<std::size_t>(begin)];
+    return std::tuple{sums_.row(begin).data(), sums_.row(end).data(), end > begin ? 1.0F / weight : 0.0F};
   };
   for (int i = 0; i < count; ++i) {
     const auto [middle_begin, middle_end, middle] = mean_of(i);
@@ -72,11 +80,13 @@ void StripeSearch::filter() {
   }
 }
 
-void StripeSearch::centre_clipped(const Image<float>& samples) {
+void StripeSearch::centre_clipped(const Image<float>& samples, const FrameNoise& noise) {
   const int count = samples.height();
+  const auto above = static_cast<float>(noise.sensor().ceiling + 0.5);
   for (int x = 0; x < samples.width(); ++x) {
     const auto index = static_cast<std::size_t>(x);
-    const auto is_clipped = [&](int i) { return std::isinf(samples(x, i)) || std::isnan(samples(x, i)); };
+    // Within the plateau of a longer exposure, a shorter one has samples above it.
+    const auto is_clipped = [&](int i) { return !(samples(x, i) < above); };
     int begin = std::max(0, frame_[index] - box_ / 2);
     const int stop = std::min(count, frame_[index] + box_ / 2 + 1);
     while (begin < stop && !std::isinf(samples(x, begin))) ++begin;

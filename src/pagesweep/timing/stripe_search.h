@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pagesweep/base/image.h"
+#include "pagesweep/timing/sensor_noise.h"
 
 namespace pagesweep {
 
@@ -12,29 +13,31 @@ namespace pagesweep {
 ///
 /// Each gray value sequence is filtered with a box as long as the stripe minus the mean of two such boxes before and
 /// after it: nearly a matched filter, blind to constant and slowly drifting light, and its cost does not depend on the
-/// stripe's width. The highest response is the most significant bell, be there a second hump or a glint.
+/// stripe's width. Samples count by their exposures' squares. The highest response is the most significant bell, be
+/// there a second hump or a glint.
 class StripeSearch {
  public:
   /// \param fwhm  full width of the stripe at half height [frames]
   explicit StripeSearch(double fwhm);
 
   /// \param samples  as Frames::read_row() makes them: one row a frame, NaN dropped, +infinity clipped
-  /// \param ceiling  [gray values] that a clipped sample stands for at least
-  void find(const Image<float>& samples, float ceiling);
+  /// \param noise    whose ceilings a clipped sample stands for at least
+  void find(const Image<float>& samples, const FrameNoise& noise);
 
   int frame(int x) const { return frame_[static_cast<std::size_t>(x)]; }  ///< nearest to the bell's middle
   float rise(int x) const { return rise_[static_cast<std::size_t>(x)]; }  ///< filter response [gray values]
-  /// Standard deviation of rise() where only noise of this variance is seen.
-  double rise_sigma(double variance) const;
+  /// Standard deviation of rise() where only the sensor's read noise is seen.
+  double rise_sigma(const FrameNoise& noise) const;
 
  private:
-  void accumulate(const Image<float>& samples, float ceiling);
+  void accumulate(const Image<float>& samples, const FrameNoise& noise);
   void filter();
-  void centre_clipped(const Image<float>& samples);
+  void centre_clipped(const Image<float>& samples, const FrameNoise& noise);
 
-  int box_;            ///< [frames] odd
-  int distance_;       ///< [frames] from the box to those beside it
-  Image<float> sums_;  ///< row i: sum of the frames before i
+  int box_;                     ///< [frames] odd
+  int distance_;                ///< [frames] from the box to those beside it
+  Image<float> sums_;           ///< row i: weighted sum of the frames before i
+  std::vector<float> weights_;  ///< i: sum of the weights of the frames before i
   std::vector<int> frame_;
   std::vector<float> rise_;
 };

@@ -40,7 +40,7 @@ float robust_mean(std::vector<Measured>& values) {
   return static_cast<float>(sum / weight);
 }
 
-void measure_row(RowWindows& row, const StripeProfile& profile, const SensorNoise& noise, int width, int y,
+void measure_row(RowWindows& row, const StripeProfile& profile, const FrameNoise& noise, int width, int y,
                  std::vector<std::vector<Measured>>& tiles) {
   row.read(y);
   for (int x = y / row_step % column_step; x < width; x += column_step) {
@@ -104,12 +104,13 @@ std::pair<double, double> StripeWidths::range() const {
 
 StripeWidths measure_widths(const Frames& frames, const StripeProfile& profile, const SensorNoise& noise) {
   Image<float> tiles((frames.width() + tile_px - 1) / tile_px, (frames.height() + tile_px - 1) / tile_px, not_a_number);
+  const FrameNoise frame_noise(noise, frames.sequence().exposures);
   parallel_rows(tiles.height(), [&](int tile_row) {
-    RowWindows row(frames, profile, noise);
+    RowWindows row(frames, profile, frame_noise);
     std::vector<std::vector<Measured>> values(static_cast<std::size_t>(tiles.width()));
     const int end = std::min(frames.height(), (tile_row + 1) * tile_px);
     for (int y = tile_row * tile_px; y < end; y += row_step)
-      measure_row(row, profile, noise, frames.width(), y, values);
+      measure_row(row, profile, frame_noise, frames.width(), y, values);
     for (int x = 0; x < tiles.width(); ++x) tiles(x, tile_row) = robust_mean(values[static_cast<std::size_t>(x)]);
   });
   fill(tiles);
