@@ -212,6 +212,13 @@ Camera read_camera(const JsonReader& json, const Camera& fallback) {
   return camera;
 }
 
+std::vector<double> read_exposures(const JsonReader& json) {
+  std::vector<double> exposures;
+  for (const JsonReader& item : json.items()) exposures.push_back(item.number(0.01, 100));
+  if (exposures.empty() || exposures.size() > 8) throw json.error("expected 1 to 8 exposures that take turns");
+  return exposures;
+}
+
 void read_cameras(const JsonReader& json, Scene& scene) {
   read(json, "frames", scene.camera.frames, 5, 10000);
   read(json, "rays_per_side", scene.camera.rays_per_side, 1, 64);
@@ -220,6 +227,7 @@ void read_cameras(const JsonReader& json, Scene& scene) {
   double paper_level = 0.7;
   read(json, "paper_level", paper_level, 0.001, 100);
   scene.camera.exposure = paper_level / PrintDesign{}.paper_albedo;
+  if (const auto exposures = json.find("exposures")) scene.camera.exposures = read_exposures(*exposures);
   const auto views = json.find("views");
   if (!views) return;
   const auto items = views->items();

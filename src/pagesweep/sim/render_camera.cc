@@ -189,7 +189,11 @@ class CameraRenderer {
 
 template <class Pixel>
 std::vector<Image<Pixel>> render(const CameraRenderer& renderer, const Camera& camera, const SensorModel& sensor,
-                                 int frames, const CounterRandom& noise, Progress& progress) {
+                                 const CameraOptions& options, const CounterRandom& noise, Progress& progress) {
+  const int frames = options.frames;
+  const auto exposure = [&](int i) {
+    return options.exposures.empty() ? 1 : options.exposures[std::size_t(i) % options.exposures.size()];
+  };
   std::vector<Image<Pixel>> images;
   for (int i = 0; i < frames; ++i) images.emplace_back(camera.width, camera.height);
   const int band = 32;  // rows between two reports of progress
@@ -203,8 +207,8 @@ std::vector<Image<Pixel>> render(const CameraRenderer& renderer, const Camera& c
         renderer.expose_pixel(x, y, scratch, light);
         const auto first = (std::uint64_t(y) * std::uint64_t(camera.width) + std::uint64_t(x)) * std::uint64_t(frames);
         for (int i = 0; i < frames; ++i)
-          gray(x, i) = static_cast<Pixel>(
-              expose(sensor, static_cast<double>(light[std::size_t(i)]), noise, first + std::uint64_t(i)));
+          gray(x, i) = static_cast<Pixel>(expose(sensor, exposure(i) * static_cast<double>(light[std::size_t(i)]),
+                                                 noise, first + std::uint64_t(i)));
       }
       for (int i = 0; i < frames; ++i) std::ranges::copy(gray.row(i), images[std::size_t(i)].row(y).begin());
     });
@@ -243,14 +247,14 @@ Frames render_camera(const LitWorld& lit, const Camera& camera, int viewer, cons
   const CameraRenderer renderer(lit, camera, viewer, options);
   const CounterRandom noise(seed, static_cast<std::uint64_t>(viewer));
   Frames frames({camera.name, camera.width, camera.height, options.frames, sensor.bit_depth, sensor.black_level,
-                 sensor.highest()});
+                 sensor.highest(), relative_exposures(options.exposures, options.frames)});
   const auto take = [&](auto images) {
     for (int i = 0; i < options.frames; ++i) frames.set(i, std::move(images[std::size_t(i)]));
   };
   if (sensor.bit_depth <= 8)
-    take(render<std::uint8_t>(renderer, camera, sensor, options.frames, noise, progress));
+    take(render<std::uint8_t>(renderer, camera, sensor, options, noise, progress));
   else
-    take(render<std::uint16_t>(renderer, camera, sensor, options.frames, noise, progress));
+    take(render<std::uint16_t>(renderer, camera, sensor, options, noise, progress));
   return frames;
 }
 

@@ -29,6 +29,7 @@ struct CameraOptions {
   double exposure = 0.83;      ///< share of the full well that a perfectly white level spot at the table's origin fills
   double ambient = 0.01;       ///< steady light, in units of the stripe's there
   int frames = 200;
+  std::vector<double> exposures = {};  ///< of the frames in turn, 1: as above; empty: all 1
 };
 
 /// Renders what a camera records of the sweep. The image of a point is the lens' point spread, integrated over the

@@ -38,7 +38,7 @@ const char* const known_fields = R"({
     "bar_length_mm": 0, "bar_y_mm": 0, "shape": 0, "fwhm_mm": 0, "softness": 0
   },
   "cameras": {
-    "frames": 0, "rays_per_side": 0, "psf_sigma_px": 0, "ambient": 0, "paper_level": 0,
+    "frames": 0, "rays_per_side": 0, "psf_sigma_px": 0, "ambient": 0, "paper_level": 0, "exposures": 0,
     "views": {
       "size_px": 0, "focal_px": 0, "principal_px": 0, "distortion": 0, "center_mm": 0, "target_mm": 0, "roll_deg": 0
     }

@@ -71,6 +71,15 @@ TEST_F(SceneTest, NamesWhatIsWrong) {
               HasSubstr("scanner.bit_depth"));
 }
 
+TEST_F(SceneTest, ReadsExposuresThatTakeTurns) {
+  const auto with = [](const std::string& exposures) {
+    return "\"pages\": [{" + sheet + R"(}], "cameras": {"exposures": )" + exposures + "}";
+  };
+  EXPECT_EQ(read(with("[1, 8]")).camera.exposures, (std::vector{1.0, 8.0}));
+  EXPECT_THAT(problem_of(with("[]")), HasSubstr("cameras.exposures"));
+  EXPECT_THAT(problem_of(with("[1, 0]")), HasSubstr("cameras.exposures[1]"));
+}
+
 TEST_F(SceneTest, PutsEveryScannerAboveTheTable) {
   for (const char* model : {"brown-conrady", "pushbroom", "rotating-line"}) {
     const Scene scene = read("\"pages\": [{" + sheet + R"(}], "scanner": {"model": ")" + model + "\"}");
@@ -90,7 +99,7 @@ TEST_F(SceneTest, PutsEveryScannerAboveTheTable) {
 /// The scenes of the project: everything is within view of both cameras, of the scanner, and of the whole sweep.
 TEST(Scenes, ShowTheirPagesToEveryInstrument) {
   for (const char* name : {"spread", "dent", "overexposed", "flat", "artefact", "artefact_across", "artefact_inclined",
-                           "artefact_high", "folded"}) {
+                           "artefact_high", "folded", "exposure"}) {
     const Scene scene = read_scene(fs::path(PAGESWEEP_SCENES) / (std::string(name) + ".json"));
     const double margin_frames = 1.5 * scene.lamp.fwhm_mm / 1.7;
     for (const ScenePage& page : scene.pages) {
@@ -113,6 +122,7 @@ TEST_F(SceneTest, BecomesACaptureFolderThatCanBeRead) {
   scene.pages[0].print.footer = std::string("7");
   for (Camera& camera : scene.rig.cameras) camera.width = camera.height = 64;
   scene.camera.frames = 20;
+  scene.camera.exposures = {1, 4};
   Pushbroom line = std::get<Pushbroom>(scene.rig.scanner->model());
   line.width = 300, line.height = 200;
   scene.rig.scanner = Scanner(line);
@@ -125,6 +135,8 @@ TEST_F(SceneTest, BecomesACaptureFolderThatCanBeRead) {
   EXPECT_EQ(frames[1].count(), 10);
   EXPECT_EQ(frames[1].width(), 16);
   EXPECT_EQ(frames[1].dropped(), 0);
+  EXPECT_EQ(capture.sequences[0].exposure_ms, scene.camera.exposures);
+  EXPECT_EQ(frames[1].sequence().exposure(8), 0.25);
   const Picture scan = read_picture(*capture.scan_path());
   EXPECT_EQ(scan.width(), 100);
   EXPECT_EQ(scan.channels, 3);

@@ -76,6 +76,24 @@ Bell bell_of(const Frames& frames, int x, int y) {
   return bell;
 }
 
+TEST(Simulate, FramesTakeTurnsWithTheirExposures) {
+  Scene scene = make_small_scene();
+  make_noise_free(scene);
+  const Frames once = simulate(scene, {}).frames[0];
+  scene.camera.exposures = {0.25, 1};
+  const Frames frames = simulate(scene, {}).frames[0];
+  EXPECT_EQ(frames.sequence().exposure(0), 0.25);
+  EXPECT_EQ(frames.sequence().exposure(1), 1);
+  Image<float> all_long, mixed;
+  once.read_row(36, all_long);
+  frames.read_row(36, mixed);
+  for (int i = 0; i < frames.count(); ++i) {
+    EXPECT_NEAR(mixed(36, i), all_long(36, i), 3) << "four times half a gray value, and half a one";
+    const auto& shown = std::get<Image<std::uint16_t>>(frames.frame(i));
+    EXPECT_NEAR(shown(36, 36), all_long(36, i) * (i % 2 == 0 ? 0.25 : 1), 1);
+  }
+}
+
 bool is_inside_page(const Image<Eigen::Vector3f>& points, int x, int y, int margin_px) {
   for (int j = y - margin_px; j <= y + margin_px; ++j)
     for (int i = x - margin_px; i <= x + margin_px; ++i)

@@ -37,7 +37,7 @@ void write_capture_files(const Simulation& simulation, const fs::path& folder, P
   for (const Frames& frames : simulation.frames) {
     const Sequence& sequence = frames.sequence();
     capture.sequences.push_back({sequence.camera, sequence.camera + "/%06d.png", 0, sequence.count, sequence.bit_depth,
-                                 sequence.black_level, sequence.saturation});
+                                 sequence.black_level, sequence.saturation, simulation.scene.camera.exposures});
     write_frames(frames, capture, capture.sequences.back(), progress);
   }
   if (simulation.rig.scanner) {
