@@ -100,10 +100,13 @@ void evaluate_points(const fs::path& out, const std::vector<CameraData>& cameras
   }
 }
 
-/// The bound, if the truth tells profile and sensor.
+bool has_one_exposure(const SequenceFiles& files) { return relative_exposures(files.exposure_ms, files.count).empty(); }
+
+/// The bound, if the truth tells profile and sensor and all frames are exposed alike.
 BoundOfAmplitude find_bound(const Truth& truth, const std::optional<Capture>& capture) {
   if (!truth.sensor || !truth.profile || !(truth.sensor->gain_e_per_gray > 0) || truth.profile->values.size() < 3)
     return {};
+  if (capture && !std::ranges::all_of(capture->sequences, has_one_exposure)) return {};
   double clips_at = std::numeric_limits<double>::infinity();
   if (capture && !capture->sequences.empty())
     clips_at = capture->sequences[0].saturation - capture->sequences[0].black_level;

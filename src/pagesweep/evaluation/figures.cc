@@ -89,7 +89,7 @@ void add_kinds(const Evaluation& evaluation, std::vector<Figure>& figures) {
   const auto add = [&](const std::string& kind, const std::string& where, const PointsOfKind& points) {
     if (points.distance.count == 0) return;
     Group group(figures, "points_" + kind, "");
-    Group bound(figures, "points_" + kind, "the truth does not tell the stripe's profile and the sensor's noise");
+    Group bound(figures, "points_" + kind, "no profile and sensor in the truth, or exposures that differ");
     group.add("rms", "distance to the true surface " + where + ", rms", points.distance.rms, "mm");
     group.add("p95", "distance that 95 % of them keep", points.distance.p95, "mm");
     group.add("error_over_claim", "rms over what they claim", points.error_over_claim());
@@ -105,9 +105,9 @@ void add_kinds(const Evaluation& evaluation, std::vector<Figure>& figures) {
 void add_times(const Evaluation& evaluation, std::vector<Figure>& figures) {
   const TimeComparison times = evaluation.times.value_or(TimeComparison{});
   Group group(figures, "times", evaluation.times ? "there are no pixels of this kind" : evaluation.times_reason);
-  Group bound(figures, "times",
-              evaluation.times ? "the truth does not tell the stripe's profile and the sensor's noise"
-                               : evaluation.times_reason);
+  Group bound(
+      figures, "times",
+      evaluation.times ? "no profile and sensor in the truth, or exposures that differ" : evaluation.times_reason);
   const auto add = [&](const std::string& prefix, const std::string& which, const TimeErrors& errors) {
     group.add(prefix + "rms", "error" + which + ", rms", errors.error.rms, "frames");
     group.add(prefix + "p95", "error that 95 % keep" + which, errors.error.p95, "frames");
