@@ -13,6 +13,7 @@
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/ply_file.h"
+#include "pagesweep/io/recording_file.h"
 #include "pagesweep/io/rig_file.h"
 #include "pagesweep/io/truth_file.h"
 
@@ -29,6 +30,9 @@ void read(const std::filesystem::path& file) {
   pagesweep::read_ply(file);
 #elif defined(PAGESWEEP_FUZZ_float_tiff)
   pagesweep::read_float_tiff(file);
+#elif defined(PAGESWEEP_FUZZ_recording)
+  const pagesweep::RecordingReader reader(file);
+  for (int page = 0; page < reader.pages(); ++page) reader.read(page);
 #else  // png, tiff: told apart by their first bytes
   pagesweep::read_gray(file);
 #endif

@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/io/atomic_file.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <atomic>
-#include <cerrno>
-#include <system_error>
+#include <span>
 
 #include "pagesweep/base/error.h"
+#include "pagesweep/io/file_descriptor_internal.h"
 
 namespace pagesweep {
 namespace {
-
-std::string message_of(int error_number) { return std::generic_category().message(error_number); }
 
 /// A new, empty file beside the target. O_EXCL: never somebody else's file or link.
 std::filesystem::path make_temporary(const std::filesystem::path& target) {
@@ -32,24 +28,6 @@ std::filesystem::path make_temporary(const std::filesystem::path& target) {
     if (errno != EEXIST) throw cannot_write(target, message_of(errno));
   }
 }
-
-class Descriptor {
- public:
-  Descriptor(const std::filesystem::path& file, int flags) : number_(::open(file.c_str(), flags | O_CLOEXEC)) {}
-  ~Descriptor() { close(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int number() const { return number_; }
-  /// Some file systems tell only here that the disk is full.
-  bool close() {
-    const bool closed = number_ < 0 || ::close(number_) == 0;
-    number_ = -1;
-    return closed;
-  }
-
- private:
-  int number_;
-};
 
 }  // namespace
 
@@ -78,20 +56,15 @@ void AtomicFile::commit() {
 
 void write_bytes(const std::filesystem::path& file, std::string_view bytes) {
   AtomicFile output(file);
-  Descriptor descriptor(output.temporary(), O_WRONLY);  // not O_TRUNC, after which ext4 waits for the disk
+  FileDescriptor descriptor(output.temporary(), O_WRONLY);  // not O_TRUNC, after which ext4 waits for the disk
   if (descriptor.number() < 0) throw cannot_write(file, message_of(errno));
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor.number(), bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw cannot_write(file, message_of(errno));
-    bytes.remove_prefix(static_cast<std::size_t>(written));
-  }
+  if (!descriptor.write(std::as_bytes(std::span(bytes)))) throw cannot_write(file, message_of(errno));
   if (!descriptor.close()) throw cannot_write(file, message_of(errno));
   output.commit();
 }
 
 std::string read_bytes(const std::filesystem::path& file, std::size_t most_bytes) {
-  Descriptor descriptor(file, O_RDONLY);
+  FileDescriptor descriptor(file, O_RDONLY);
   if (descriptor.number() < 0) throw cannot_read(file, message_of(errno));
   struct stat status{};
   if (::fstat(descriptor.number(), &status) != 0) throw cannot_read(file, message_of(errno));
