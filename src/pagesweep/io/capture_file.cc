@@ -73,9 +73,31 @@ std::vector<double> read_exposures(const JsonReader& json, int count) {
   return exposures;
 }
 
-SequenceFiles read_sequence(const JsonReader& json) {
-  SequenceFiles files;
-  files.camera = json.at("camera").text();
+/// Frames without a page: each once and in ascending order, which a list made by hand may have wrong.
+std::vector<int> read_dropped(const JsonReader& json, int count) {
+  std::vector<int> dropped;
+  for (const JsonReader& item : json.items()) {
+    const int frame = item.integer(0, count - 1);
+    if (!dropped.empty() && frame <= dropped.back())
+      throw item.error(fmt::format("expected a frame after {}, found {}", dropped.back(), frame));
+    dropped.push_back(frame);
+  }
+  if (dropped.size() == static_cast<std::size_t>(count)) throw json.error("expected fewer frames than all");
+  return dropped;
+}
+
+/// Where the frames are, once their count is known.
+void read_places(const JsonReader& json, SequenceFiles& files) {
+  const auto dropped = json.find("dropped");
+  if (const auto recording = json.find("recording")) {
+    if (const auto frames = json.find("frames"))
+      throw frames->error("expected either \"frames\" or \"recording\", found both");
+    files.recording = read_path(*recording);
+    if (dropped) files.dropped = read_dropped(*dropped, files.count);
+    return;
+  }
+  if (dropped)
+    throw dropped->error("expected it beside \"recording\" only: the file of a dropped frame is just missing");
   files.frames = json.at("frames").text();
   if (!parse_pattern(files.frames))
     throw json.at("frames").error(
@@ -83,7 +105,13 @@ SequenceFiles read_sequence(const JsonReader& json) {
                     files.frames));
   const auto first = json.find("first");
   files.first = first ? first->integer(0, highest_number) : 0;
+}
+
+SequenceFiles read_sequence(const JsonReader& json) {
+  SequenceFiles files;
+  files.camera = json.at("camera").text();
   files.count = json.at("count").integer(1, most_frames);
+  read_places(json, files);
   files.bit_depth = json.at("bit_depth").integer(1, 16);
   const double levels = std::exp2(files.bit_depth);
   files.black_level = json.at("black_level").number(0, levels);
@@ -141,22 +169,34 @@ Capture read_capture(const std::filesystem::path& folder_or_file) {
   return capture;
 }
 
+namespace {
+
+nlohmann::ordered_json to_json(const SequenceFiles& files) {
+  nlohmann::ordered_json json = {{"camera", files.camera}};
+  if (files.recording.empty()) {
+    if (!parse_pattern(files.frames)) throw std::invalid_argument("write_capture: no frame pattern: " + files.frames);
+    json["frames"] = files.frames;
+    json["first"] = files.first;
+  } else {
+    json["recording"] = files.recording.generic_string();
+    if (!files.dropped.empty()) json["dropped"] = files.dropped;
+  }
+  json["count"] = files.count;
+  json["bit_depth"] = files.bit_depth;
+  json["black_level"] = files.black_level;
+  json["saturation"] = files.saturation;
+  if (files.exposure_ms.size() == 1) json["exposure_ms"] = files.exposure_ms.front();
+  if (files.exposure_ms.size() > 1) json["exposure_ms"] = files.exposure_ms;
+  return json;
+}
+
+}  // namespace
+
 void write_capture(const Capture& capture) {
   nlohmann::ordered_json json = {
       {"format", "pagesweep-capture"}, {"version", 1}, {"rig", capture.rig.generic_string()}};
   json["sequences"] = nlohmann::ordered_json::array();
-  for (const SequenceFiles& files : capture.sequences) {
-    if (!parse_pattern(files.frames)) throw std::invalid_argument("write_capture: no frame pattern: " + files.frames);
-    json["sequences"].push_back({{"camera", files.camera},
-                                 {"frames", files.frames},
-                                 {"first", files.first},
-                                 {"count", files.count},
-                                 {"bit_depth", files.bit_depth},
-                                 {"black_level", files.black_level},
-                                 {"saturation", files.saturation}});
-    if (files.exposure_ms.size() == 1) json["sequences"].back()["exposure_ms"] = files.exposure_ms.front();
-    if (files.exposure_ms.size() > 1) json["sequences"].back()["exposure_ms"] = files.exposure_ms;
-  }
+  for (const SequenceFiles& files : capture.sequences) json["sequences"].push_back(to_json(files));
   if (capture.scan) json["scan"] = {{"image", capture.scan->generic_string()}};
   if (!capture.notes.empty()) json["notes"] = capture.notes;
   write_json(capture.folder / "capture.json", json);

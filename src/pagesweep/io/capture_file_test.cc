@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/io/capture_file.h"
 
+#include <chrono>
+#include <thread>
+
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/io/files_testing.h"
 #include "pagesweep/io/image_file.h"
+#include "pagesweep/io/recording_file.h"
 #include "pagesweep/io/rig_file.h"
 
 namespace pagesweep {
@@ -236,6 +240,117 @@ TEST(CaptureFile, RefusesExposuresThatAreNone) {
                 AllOf(HasSubstr("capture.json: sequences[0]." + place + ": "), HasSubstr(hint)))
         << value;
   }
+}
+
+/// The capture of make_capture() with the first camera's frames in a recording, some of them dropped.
+Capture make_recording(const TestFolder& folder, const std::vector<int>& dropped) {
+  Capture capture = make_capture(folder);
+  SequenceFiles& files = capture.sequences[0];
+  files.recording = "recordings/cam1.tiff";
+  files.frames.clear();
+  files.first = 0;
+  files.dropped = dropped;
+  RecordingWriter writer(folder / "recordings/cam1.tiff", {side, side}, 8, frame_count);
+  for (int i = 0; i < frame_count; ++i)
+    if (!std::ranges::binary_search(dropped, i)) writer.append(frame_of(0, i));
+  writer.commit();
+  write_capture(capture);
+  return capture;
+}
+
+TEST(CaptureFile, ReadsRecordingsAndKnowsTheirDroppedFrames) {
+  const TestFolder folder;
+  const std::vector<int> dropped = {0, 7, 8, 19};
+  make_recording(folder, dropped);
+  const Capture back = read_capture(folder.path());
+  EXPECT_EQ(back.sequences[0].recording, "recordings/cam1.tiff");
+  EXPECT_EQ(back.sequences[0].dropped, dropped);
+  EXPECT_THROW(back.frame_path(back.sequences[0], 3), std::invalid_argument);
+  const auto frames = read_frames(back);
+  EXPECT_EQ(frames[0].dropped(), 4);
+  EXPECT_EQ(frames[1].dropped(), 0);
+  for (int i = 0; i < frame_count; ++i) {
+    ASSERT_EQ(frames[0].has(i), !std::ranges::binary_search(dropped, i));
+    if (!frames[0].has(i)) continue;
+    const auto& image = std::get<Image<std::uint8_t>>(frames[0].frame(i));
+    EXPECT_TRUE(std::ranges::equal(image.pixels(), frame_of(0, i).pixels())) << i;
+  }
+}
+
+TEST(CaptureFile, RefusesRecordingsThatAreNotWhatCaptureJsonSays) {
+  const TestFolder folder;
+  Capture capture = make_recording(folder, {7});
+  capture.sequences[0].dropped = {};
+  EXPECT_THAT(
+      error_of([&] { read_frames(capture); }),
+      AllOf(HasSubstr("cam1.tiff: expected 20 pages for \"count\" 20 and 0 \"dropped\""), HasSubstr("found 19")));
+  capture.sequences[0].dropped = {7};
+  capture.sequences[0].bit_depth = 5;
+  EXPECT_THAT(error_of([&] { read_frames(capture); }), AllOf(HasSubstr("cam1.tiff: page 0: "), HasSubstr("below 32")));
+  capture.sequences[0].bit_depth = 12;
+  EXPECT_THAT(error_of([&] { read_frames(capture); }), HasSubstr("expected 16 bit samples for the bit_depth 12"));
+}
+
+TEST(CaptureFile, SaysWhatIsWrongWithARecordingsFields) {
+  const TestFolder folder;
+  make_recording(folder, {3, 7});
+  const std::string sound = read_text(folder / "capture.json");
+  const std::string list = sound.substr(sound.find("\"dropped\""), sound.find(']') + 1 - sound.find("\"dropped\""));
+  const std::tuple<std::string, std::string, std::string, std::string> damages[] = {
+      {list, "\"dropped\": [7, 3]", "sequences[0].dropped[1]", "a frame after 7, found 3"},
+      {list, "\"dropped\": [7, 7]", "sequences[0].dropped[1]", "a frame after 7, found 7"},
+      {list, "\"dropped\": [20]", "sequences[0].dropped[0]", "from 0 to 19"},
+      {list, "\"dropped\": [-1]", "sequences[0].dropped[0]", "from 0 to 19"},
+      {list, "\"dropped\": 3", "sequences[0].dropped", "expected an array"},
+      {list, "\"frames\": \"a/%d.png\"", "sequences[0].frames", "either \"frames\" or \"recording\""},
+      {"\"recordings/cam1.tiff\"", "\"\"", "sequences[0].recording", "expected a file's path"},
+      {"\"first\": 3", "\"dropped\": [3]", "sequences[1].dropped", "beside \"recording\" only"},
+  };
+  for (const auto& [from, to, place, hint] : damages) {
+    test::put(folder / "capture.json", replaced(sound, from, to));
+    EXPECT_THAT(error_of([&] { read_capture(folder.path()); }),
+                AllOf(HasSubstr("capture.json: " + place + ": "), HasSubstr(hint)))
+        << to;
+  }
+}
+
+TEST(CaptureFile, DeliversAllInstantsBeforeABadOneAndThenItsErrorForEver) {
+  const TestFolder folder;
+  const Capture capture = make_capture(folder);
+  write_bytes(capture.frame_path(capture.sequences[1], 13), "nonsense");
+  const auto source = open_capture(capture, read_capture_rig(capture));
+  for (int i = 0; i < 13; ++i) {
+    const auto set = source->next();
+    ASSERT_TRUE(set);
+    EXPECT_EQ(set->index, i);
+  }
+  for (int again = 0; again < 3; ++again)
+    EXPECT_THAT(error_of([&] { source->next(); }), HasSubstr("000016.png"));  // frame 0 is file 3
+}
+
+TEST(CaptureFile, EndsWithoutBeingReadToItsEnd) {
+  const TestFolder folder;
+  const Capture capture = make_capture(folder);
+  const Rig rig = read_capture_rig(capture);
+  for (int fetched = 0; fetched < frame_count; fetched += 3) {
+    const auto source = open_capture(capture, rig);
+    for (int i = 0; i < fetched; ++i) ASSERT_TRUE(source->next());
+  }
+  const auto source = open_capture(capture, rig);
+  for (int i = 0; i < frame_count; ++i) ASSERT_TRUE(source->next());
+  for (int again = 0; again < 3; ++again) EXPECT_FALSE(source->next());
+}
+
+TEST(CaptureFile, ReadsAtMost16InstantsAhead) {
+  const TestFolder folder;
+  const Capture capture = make_capture(folder);
+  const auto source = open_capture(capture, read_capture_rig(capture));
+  ASSERT_TRUE(source->next());
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // for a reader without bounds, to betray itself
+  write_gray_png(capture.frame_path(capture.sequences[0], 18), Image<std::uint8_t>(side, side, 99).view());
+  for (int i = 1; i < 18; ++i) ASSERT_TRUE(source->next());
+  const auto set = source->next();
+  EXPECT_EQ(std::get<Image<std::uint8_t>>(*set->images[0])(5, 5), 99);
 }
 
 TEST(CaptureFile, NumbersFramesWithAndWithoutPadding) {

@@ -7,6 +7,7 @@
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/ply_file.h"
+#include "pagesweep/io/recording_file.h"
 #include "pagesweep/io/rig_file.h"
 #include "pagesweep/io/truth_file.h"
 
@@ -76,6 +77,7 @@ void write_capture_to(const std::filesystem::path& file) {
   Capture capture;
   capture.folder = file.parent_path();
   capture.sequences = {{"cam1", "cam1/%06d.png", 0, 9, 8, 2, 255}};
+  capture.sequences.push_back({"cam2", "", 0, 9, 8, 2, 255, {}, "cam2.tiff", {3, 7}});
   capture.scan = "scan.png";
   write_capture(capture);
 }
@@ -93,6 +95,18 @@ void write_ply_to(const std::filesystem::path& file) {
   std::vector<PointMap> maps(1, PointMap(5, 5));
   std::ranges::fill(maps[0].status.pixels(), PixelStatus::ok);
   write_ply(file, maps);
+}
+
+/// Small frames, so that most of the file says where they are.
+void write_recording(const std::filesystem::path& file) {
+  RecordingWriter writer(file, {5, 3}, 16, 6);
+  for (int i = 0; i < 6; ++i) writer.append(Image<std::uint16_t>(5, 3, static_cast<std::uint16_t>(i)));
+  writer.commit();
+}
+
+void read_recording(const std::filesystem::path& file) {
+  const RecordingReader reader(file);
+  for (int page = 0; page < reader.pages(); ++page) reader.read(page);
 }
 
 std::vector<Format> all_formats() {
@@ -119,6 +133,7 @@ std::vector<Format> all_formats() {
       {"map.tiff", write_map, [](const Path& file) { read_float_tiff(file); }},
       {"8.png", [](const Path& f) { write_gray_png(f, Image<std::uint8_t>(30, 20, 7).view()); }, read_frame},
       {"16.png", [](const Path& f) { write_gray_png(f, Image<std::uint16_t>(30, 20, 700).view()); }, read_frame},
+      {"recording.tiff", write_recording, read_recording},
       {"frame.tif", [](const Path& f) { write_picture(f, make_picture(30, 20, 1, 16)); }, read_frame},
       {"page.png", write_page, read_page},
       {"page.tif", write_page, read_page},
