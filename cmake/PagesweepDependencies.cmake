@@ -18,4 +18,5 @@ if(PAGESWEEP_BUILD_TESTS)
 endif()
 if(PAGESWEEP_BUILD_BENCHMARKS)
   find_package(benchmark REQUIRED)
+  find_package(OpenCV QUIET COMPONENTS imgproc)  # what we compare with
 endif()

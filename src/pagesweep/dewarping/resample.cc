@@ -13,78 +13,10 @@
 #include <vector>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/dewarping/resample_run_internal.h"
 
 namespace pagesweep {
 namespace {
-
-double cubic(double x, double b, double c) {
-  x = std::abs(x);
-  if (x < 1) return ((12 - 9 * b - 6 * c) * x * x * x + (-18 + 12 * b + 6 * c) * x * x + 6 - 2 * b) / 6;
-  if (x < 2) return ((-b - 6 * c) * x * x * x + (6 * b + 30 * c) * x * x + (-12 * b - 48 * c) * x + 8 * b + 24 * c) / 6;
-  return 0;
-}
-
-double sinc(double x) { return x == 0 ? 1 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x); }
-
-double kernel_value(ResampleKernel kernel, double x) {
-  switch (kernel) {
-    case ResampleKernel::catmull_rom:
-      return cubic(x, 0, 0.5);
-    case ResampleKernel::mitchell:
-      return cubic(x, 1.0 / 3, 1.0 / 3);
-    case ResampleKernel::lanczos3:
-      return std::abs(x) < 3 ? sinc(x) * sinc(x / 3) : 0;
-  }
-  return 0;
-}
-
-int radius_of(ResampleKernel kernel) { return kernel == ResampleKernel::lanczos3 ? 3 : 2; }
-
-/// Taps of a kernel widened by `scale`: pixels first_tap() ... first_tap() + taps - 1, counted from the position's
-/// floor.
-int taps_of(ResampleKernel kernel, double scale) { return 2 * static_cast<int>(std::ceil(radius_of(kernel) * scale)); }
-int first_tap(int taps) { return 1 - taps / 2; }
-
-/// Weights of all taps for a position `fraction` beyond a pixel's centre; they sum to 1.
-void compute_weights(ResampleKernel kernel, double scale, double fraction, std::span<float> weights) {
-  const int first = first_tap(static_cast<int>(weights.size()));
-  double sum = 0;
-  for (std::size_t k = 0; k < weights.size(); ++k)
-    sum += kernel_value(kernel, (first + static_cast<int>(k) - fraction) / scale);
-  for (std::size_t k = 0; k < weights.size(); ++k)
-    weights[k] = static_cast<float>(kernel_value(kernel, (first + static_cast<int>(k) - fraction) / scale) / sum);
-}
-
-/// The weights of one kernel width for all fractions of a pixel.
-class WeightTable {
- public:
-  WeightTable(ResampleKernel kernel, double scale)
-      // A wide kernel changes little from one phase to the next: the table's size stays the same.
-      : taps_(taps_of(kernel, scale)), phases_(std::max(64, static_cast<int>(1024 / scale))) {
-    weights_.resize(static_cast<std::size_t>(taps_) * static_cast<std::size_t>(phases_ + 1));
-    for (int phase = 0; phase <= phases_; ++phase)
-      compute_weights(
-          kernel, scale, double(phase) / phases_,
-          std::span(weights_).subspan(static_cast<std::size_t>(phase * taps_), static_cast<std::size_t>(taps_)));
-  }
-  int taps() const { return taps_; }
-  const float* weights(float fraction) const {
-    return weights_.data() + static_cast<int>(fraction * static_cast<float>(phases_) + 0.5f) * taps_;
-  }
-
- private:
-  int taps_;
-  int phases_;
-  std::vector<float> weights_;
-};
-
-/// Kernel widths are told apart in steps of 1/32.
-constexpr float steps_per_scale = 32;
-constexpr float max_scale = 32;
-int scale_bin(float scale) {
-  return scale > 1 ? static_cast<int>((std::min(scale, max_scale) - 1) * steps_per_scale + 0.5f) : 0;
-}
-double scale_of_bin(int bin) { return 1 + bin / double(steps_per_scale); }
 
 /// Change of a map from one pixel to the next. Of the two sides the smaller one counts: where the map jumps, across a
 /// hidden strip, the other side is the neighbour on the paper.
@@ -113,129 +45,102 @@ T to_sample(float value) {
   return static_cast<T>(std::clamp(value, 0.0f, white) + 0.5f);
 }
 
-/// The part of the scan under one kernel.
-struct Footprint {
-  int x, y;  ///< first tap [px]
-  int taps_u, taps_v;
-  const float* weights_u;
-  const float* weights_v;
-};
-
-/// Weighted sum over a footprint. `Taps` fixes the number of taps along u at compile time; 0: any.
-/// \param columns  room for taps_u x Channels values
-template <class T, int Channels, int Taps>
-void sum_inside(const Image<T>& samples, const Footprint& at, float* columns, float* sums) {
-  const int length = (Taps > 0 ? Taps : at.taps_u) * Channels;
-  std::fill_n(columns, length, 0.0f);
-  for (int j = 0; j < at.taps_v; ++j) {
-    const T* row = &samples(at.x * Channels, at.y + j);
-    const float weight = at.weights_v[j];
-    for (int k = 0; k < length; ++k) columns[k] += weight * static_cast<float>(row[k]);
-  }
-  std::fill_n(sums, Channels, 0.0f);
-  for (int k = 0; k < length / Channels; ++k)
-    for (int c = 0; c < Channels; ++c) sums[c] += at.weights_u[k] * columns[k * Channels + c];
-}
-
-/// The same where the footprint reaches beyond the scan: its outermost pixels are repeated.
-template <class T, int Channels>
-void sum_at_border(const Image<T>& samples, const Footprint& at, float* sums) {
-  std::fill_n(sums, Channels, 0.0f);
-  for (int j = 0; j < at.taps_v; ++j)
-    for (int k = 0; k < at.taps_u; ++k) {
-      const int x = std::clamp(at.x + k, 0, samples.width() / Channels - 1);
-      const int y = std::clamp(at.y + j, 0, samples.height() - 1);
-      for (int c = 0; c < Channels; ++c)
-        sums[c] += at.weights_v[j] * at.weights_u[k] * static_cast<float>(samples(x * Channels + c, y));
+/// Weighted sum where the kernel reaches beyond the scan: its outermost pixels are repeated.
+template <class T>
+void sum_at_border(const ResampleRun<T, float>& run, int width, int height, int k) {
+  const int taps_u = run.across->taps(), taps_v = run.down->taps();
+  const float* weights_u = run.across->down(run.u[k] & (phases_per_px - 1));
+  const float* weights_v = run.down->down(run.v[k] & (phases_per_px - 1));
+  float sums[3] = {};
+  for (int j = 0; j < taps_v; ++j)
+    for (int i = 0; i < taps_u; ++i) {
+      const int x = std::clamp((run.u[k] >> phase_bits) + first_tap(taps_u) + i, 0, width - 1);
+      const int y = std::clamp((run.v[k] >> phase_bits) + first_tap(taps_v) + j, 0, height - 1);
+      const T* pixel = run.scan + y * run.stride + static_cast<std::ptrdiff_t>(x) * run.channels;
+      for (int c = 0; c < run.channels; ++c) sums[c] += weights_v[j] * weights_u[i] * static_cast<float>(pixel[c]);
     }
+  for (int c = 0; c < run.channels; ++c) run.out[k * run.channels + c] = to_sample<T>(sums[c]);
 }
 
-template <class T, int Channels>
+template <class T>
 class Resampler {
  public:
-  Resampler(const Image<T>& scan, const ScanMap& map, const ResampleOptions& options)
-      : scan_(scan), map_(map), fill_(to_sample<T>(float(options.fill) * std::numeric_limits<T>::max())) {
-    const auto [low, high] = range_of_bins();
-    first_bin_ = low;
-    for (int bin = low; bin <= high; ++bin) tables_.emplace_back(options.kernel, scale_of_bin(bin));
-  }
+  Resampler(const Image<T>& scan, int channels, const ScanMap& map, const ResampleOptions& options)
+      : scan_(scan),
+        channels_(channels),
+        map_(map),
+        options_(options),
+        fixed_(options.kernel, fixed_point_layout(channels)),
+        float_(options.kernel, float_layout(channels)) {}
 
-  void fill_row(int y, std::span<T> out) const {
-    const auto taps = static_cast<std::size_t>(tables_.empty() ? 0 : tables_.back().taps());
-    std::vector<float> columns(taps * Channels);
-    for (int x = 0; x < map_.width(); ++x) {
-      T* pixel = &out[static_cast<std::size_t>(x) * Channels];
-      if (is_hidden(x, y)) {
-        std::fill_n(pixel, Channels, fill_);
-        continue;
-      }
-      float sums[Channels];
-      add_up(footprint(x, y), columns.data(), sums);
-      for (int c = 0; c < Channels; ++c) pixel[c] = to_sample<T>(sums[c]);
+  /// Pixels [x, x + count) of a page row; `out` is the row.
+  void fill(int x, int y, int count, T* out) {
+    Lookups lookups;
+    look_up(map_, x, y, count, scan_.width() / channels_, scan_.height(), lookups);
+    for (int begin = 0, end = 0; begin < count; begin = end) {
+      const int width_u = lookups.width_u[begin], width_v = lookups.width_v[begin];
+      while (end < count && lookups.width_u[end] == width_u && lookups.width_v[end] == width_v) ++end;
+      T* pixels = out + static_cast<std::ptrdiff_t>(x + begin) * channels_;
+      if (width_u == Lookups::hidden)
+        std::fill_n(pixels, (end - begin) * channels_,
+                    to_sample<T>(float(options_.fill) * std::numeric_limits<T>::max()));
+      else
+        sum(lookups, begin, end, pixels);
     }
   }
 
  private:
-  bool is_hidden(int x, int y) const {
-    return is_outside(map_.u(x, y), map_.v(x, y), scan_.width() / Channels, scan_.height());
+  /// Fixed point is exact enough for 8 bit and so many taps: rounding errors of 1/128 gray value a tap along either
+  /// axis stay below half a gray value, so that a constant picture stays constant.
+  static constexpr int most_taps_in_fixed_point = 16;
+
+  template <class Weight>
+  ResampleRun<T, Weight> run_of(const Lookups& lookups, int begin, int count, KernelTables<Weight>& tables, T* out) {
+    return {scan_.data(),
+            scan_.width(),
+            channels_,
+            &tables[lookups.width_u[begin]],
+            &tables[lookups.width_v[begin]],
+            lookups.u + begin,
+            lookups.v + begin,
+            count,
+            out};
   }
 
-  /// The kernel widths that occur, so that only their tables are made.
-  std::pair<int, int> range_of_bins() const {
-    const auto height = static_cast<std::size_t>(map_.height());
-    std::vector<std::pair<int, int>> of_row(height, {std::numeric_limits<int>::max(), -1});
-    parallel_rows(map_.height(), [&](int y) {
-      auto& [low, high] = of_row[static_cast<std::size_t>(y)];
-      for (int x = 0; x < map_.width(); ++x) {
-        if (is_hidden(x, y)) continue;
-        for (const Image<float>* position : {&map_.u, &map_.v}) {
-          const int bin = scale_bin(scale_at(*position, x, y));
-          low = std::min(low, bin);
-          high = std::max(high, bin);
-        }
+  /// Pixels of the same kernel widths, stretch by stretch within the scan or at its border.
+  void sum(const Lookups& lookups, int begin, int end, T* out) {
+    const int width = scan_.width() / channels_;
+    const int taps_u = taps_of(options_.kernel, width_of(lookups.width_u[begin]));
+    const int taps_v = taps_of(options_.kernel, width_of(lookups.width_v[begin]));
+    constexpr int overread = 32;  // the most lanes that a vector has: the same on all processors
+    const auto is_inside = [&](int k) {
+      const int u = (lookups.u[k] >> phase_bits) + first_tap(taps_u);
+      const int v = (lookups.v[k] >> phase_bits) + first_tap(taps_v);
+      // What is read beyond the end of a row is the next row, which the last one has not.
+      return u >= 0 && v >= 0 && u + taps_u <= width &&
+             (v + taps_v < scan_.height() || (v + taps_v == scan_.height() && u + taps_u + overread <= width));
+    };
+    for (int k = begin, next = begin; k < end; k = next) {
+      const bool inside = is_inside(k);
+      while (next < end && is_inside(next) == inside) ++next;
+      T* pixels = out + static_cast<std::ptrdiff_t>(k - begin) * channels_;
+      if (!inside) {
+        const auto run = run_of(lookups, k, next - k, float_, pixels);
+        for (int i = 0; i < run.count; ++i) sum_at_border(run, width, scan_.height(), i);
+      } else if (std::is_same_v<T, std::uint8_t> && std::max(taps_u, taps_v) <= most_taps_in_fixed_point) {
+        if constexpr (std::is_same_v<T, std::uint8_t>) resample_run(run_of(lookups, k, next - k, fixed_, pixels));
+      } else {
+        resample_run(run_of(lookups, k, next - k, float_, pixels));
       }
-    });
-    std::pair<int, int> range{std::numeric_limits<int>::max(), -1};
-    for (const auto& [low, high] : of_row) range = {std::min(range.first, low), std::max(range.second, high)};
-    return range;
-  }
-
-  const WeightTable& table(float scale) const {
-    return tables_[static_cast<std::size_t>(scale_bin(scale) - first_bin_)];
-  }
-
-  Footprint footprint(int x, int y) const {
-    const float u = std::floor(map_.u(x, y)), v = std::floor(map_.v(x, y));
-    const WeightTable& table_u = table(scale_at(map_.u, x, y));
-    const WeightTable& table_v = table(scale_at(map_.v, x, y));
-    return {static_cast<int>(u) + first_tap(table_u.taps()),
-            static_cast<int>(v) + first_tap(table_v.taps()),
-            table_u.taps(),
-            table_v.taps(),
-            table_u.weights(map_.u(x, y) - u),
-            table_v.weights(map_.v(x, y) - v)};
-  }
-
-  void add_up(const Footprint& at, float* columns, float* sums) const {
-    const bool inside =
-        at.x >= 0 && at.y >= 0 && (at.x + at.taps_u) * Channels <= scan_.width() && at.y + at.taps_v <= scan_.height();
-    if (!inside)
-      sum_at_border<T, Channels>(scan_, at, sums);
-    else if (at.taps_u == 4)
-      sum_inside<T, Channels, 4>(scan_, at, columns, sums);
-    else if (at.taps_u == 6)
-      sum_inside<T, Channels, 6>(scan_, at, columns, sums);
-    else if (at.taps_u == 8)
-      sum_inside<T, Channels, 8>(scan_, at, columns, sums);
-    else
-      sum_inside<T, Channels, 0>(scan_, at, columns, sums);
+    }
   }
 
   const Image<T>& scan_;
+  int channels_;
   const ScanMap& map_;
-  T fill_;
-  int first_bin_ = 0;
-  std::vector<WeightTable> tables_;
+  const ResampleOptions& options_;
+  KernelTables<std::int16_t> fixed_;
+  KernelTables<float> float_;
 };
 
 /// An empty page with what the scan's file says about its picture.
@@ -273,19 +178,17 @@ T plain_sample(const Image<T>& samples, int channels, int channel, double u, dou
 
 Picture resample(const Picture& scan, const ScanMap& map, double pixels_per_mm, const ResampleOptions& options) {
   Picture page = make_page_picture(scan, map, pixels_per_mm);
-  const auto run = [&]<class T>(const Image<T>& samples, auto channels) {
+  const auto run = [&]<class T>(const Image<T>& samples) {
     auto& out = std::get<Image<T>>(page.samples);
-    const Resampler<T, channels> resampler(samples, map, options);
+    Resampler<T> resampler(samples, scan.channels, map, options);
+    // Tiles: the part of the scan that one looks at fits into the innermost cache.
     parallel_ranges(map.height(), 16, [&](int begin, int end) {
-      for (int y = begin; y < end; ++y) resampler.fill_row(y, out.row(y));
+      for (int x = 0; x < map.width(); x += Lookups::most)
+        for (int y = begin; y < end; ++y)
+          resampler.fill(x, y, std::min(Lookups::most, map.width() - x), out.row(y).data());
     });
   };
-  std::visit(
-      [&](const auto& samples) {
-        scan.channels == 1 ? run(samples, std::integral_constant<int, 1>{})
-                           : run(samples, std::integral_constant<int, 3>{});
-      },
-      scan.samples);
+  std::visit(run, scan.samples);
   return page;
 }
 
@@ -301,8 +204,9 @@ Picture resample_plainly(const Picture& scan, const ScanMap& map, double pixels_
           out(x * scan.channels + c, y) =
               is_outside(u, v, scan.width(), scan.height())
                   ? to_sample<T>(float(options.fill) * std::numeric_limits<T>::max())
-                  : plain_sample(samples, scan.channels, c, u, v, std::clamp(scale_at(map.u, x, y), 1.0f, max_scale),
-                                 std::clamp(scale_at(map.v, x, y), 1.0f, max_scale), options.kernel);
+                  : plain_sample(samples, scan.channels, c, u, v,
+                                 std::clamp(scale_at(map.u, x, y), 1.0f, largest_width),
+                                 std::clamp(scale_at(map.v, x, y), 1.0f, largest_width), options.kernel);
         }
   };
   std::visit(run, scan.samples);
