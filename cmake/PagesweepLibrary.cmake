@@ -30,16 +30,18 @@ function(pagesweep_library name)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_libraries(${target} PUBLIC ${depends} ${arg_LINK_PUBLIC} PRIVATE ${arg_LINK})
   pagesweep_warnings(${target})
+  pagesweep_precompile(${target} 4 <Eigen/Dense> ${standard_headers})
   add_custom_command(TARGET ${target} PRE_BUILD COMMAND ${CMAKE_COMMAND}
     -D "directory=${CMAKE_CURRENT_SOURCE_DIR}" -D "layer=${name}" -D "allowed=${arg_DEPENDS}"
     -P ${PROJECT_SOURCE_DIR}/cmake/CheckLayers.cmake VERBATIM)
   set_property(GLOBAL APPEND PROPERTY PAGESWEEP_LIBRARIES ${target})
 
   list(TRANSFORM arg_TEST_LINK REPLACE "^([a-z]+)$" "pagesweep_\\1")
-  if(PAGESWEEP_BUILD_TESTS AND tests)
+  if(PAGESWEEP_BUILD_TESTS AND tests AND (NOT PAGESWEEP_TEST_ONLY OR name IN_LIST PAGESWEEP_TEST_ONLY))
     add_executable(${name}_test ${tests})
     target_link_libraries(${name}_test PRIVATE ${target} ${arg_LINK} ${arg_TEST_LINK} GTest::gmock GTest::gtest_main)
     pagesweep_warnings(${name}_test)
+    pagesweep_precompile(${name}_test 3 <gmock/gmock.h> <gtest/gtest.h> <Eigen/Dense> ${standard_headers})
     target_compile_options(${name}_test PRIVATE $<$<CONFIG:Debug>:-O0>)  # sanitized, tests take thrice as long to optimise
     gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 60 PROPERTIES LABELS unit TIMEOUT 300)
   endif()
@@ -47,6 +49,18 @@ function(pagesweep_library name)
     add_executable(${name}_bench ${benches})
     target_link_libraries(${name}_bench PRIVATE ${target} ${arg_LINK} ${arg_TEST_LINK} benchmark::benchmark_main)
     pagesweep_warnings(${name}_bench)
+  endif()
+endfunction()
+
+set(standard_headers <algorithm> <filesystem> <functional> <map> <optional> <string> <variant> <vector>)
+
+# Precompiles headers of other projects for a target of at least that many sources; with fewer it does not pay.
+function(pagesweep_precompile target fewest)
+  get_target_property(sources ${target} SOURCES)
+  list(LENGTH sources count)
+  if(PAGESWEEP_PRECOMPILE AND count GREATER_EQUAL fewest)
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+    target_compile_options(${target} PRIVATE -fpch-preprocess)  # ccache asks for it
   endif()
 endfunction()
 

@@ -5,40 +5,49 @@
 #include <cmath>
 #include <limits>
 
+#include "pagesweep/base/plane_sums_internal.h"
+
 namespace pagesweep {
 
+void Neighbourhood::set_radius(int radius) {
+  radius_ = radius;
+  const auto side = static_cast<std::size_t>(2 * radius + 1);
+  const std::size_t padded = (side * side + plane_padding - 1) / plane_padding * plane_padding;
+  i_.assign(padded, 0);
+  j_.assign(padded, 0);
+  values_.assign(padded, std::numeric_limits<float>::quiet_NaN());
+  scratch_.resize(padded);
+  for (std::size_t k = 0; k < side * side; ++k) {
+    i_[k] = static_cast<float>(static_cast<int>(k % side) - radius);
+    j_[k] = static_cast<float>(static_cast<int>(k / side) - radius);
+  }
+}
+
 void Neighbourhood::gather(const Image<float>& values, int x, int y, int radius) {
-  i_.clear();
-  j_.clear();
-  values_.clear();
+  if (radius != radius_) set_radius(radius);
   const float middle = values(x, y);
-  const int top = std::max(0, y - radius), bottom = std::min(values.height() - 1, y + radius);
-  const int left = std::max(0, x - radius), right = std::min(values.width() - 1, x + radius);
-  for (int row = top; row <= bottom; ++row)
-    for (int column = left; column <= right; ++column) {
-      const float value = values(column, row);
-      if (!std::isfinite(value)) continue;
-      i_.push_back(static_cast<float>(column - x));
-      j_.push_back(static_cast<float>(row - y));
-      values_.push_back(value - middle);
+  const int side = 2 * radius + 1;
+  float* out = values_.data();
+  const bool inside = x >= radius && y >= radius && x + radius < values.width() && y + radius < values.height();
+  for (int row = y - radius; row <= y + radius; ++row, out += side) {
+    if (inside) {
+      const float* in = &values(x - radius, row);
+      for (int k = 0; k < side; ++k) out[k] = in[k] - middle;
+    } else {
+      for (int k = 0; k < side; ++k)
+        out[k] = values.contains(x - radius + k, row) ? values(x - radius + k, row) - middle
+                                                      : std::numeric_limits<float>::quiet_NaN();
     }
+  }
+}
+
+std::size_t Neighbourhood::size() const {
+  return static_cast<std::size_t>(std::ranges::count_if(values_, [](float value) { return std::isfinite(value); }));
 }
 
 std::optional<LocalPlane> Neighbourhood::fit(const LocalPlane& before, float limit) const {
-  float n = 0, i = 0, j = 0, ii = 0, ij = 0, jj = 0, d = 0, id = 0, jd = 0;
-  for (std::size_t k = 0; k < size(); ++k) {
-    const float use = std::abs(values_[k] - before.at(i_[k], j_[k])) <= limit ? 1.0f : 0.0f;
-    const float ui = use * i_[k], uj = use * j_[k];
-    n += use;
-    i += ui;
-    j += uj;
-    ii += ui * i_[k];
-    ij += ui * j_[k];
-    jj += uj * j_[k];
-    d += use * values_[k];
-    id += ui * values_[k];
-    jd += uj * values_[k];
-  }
+  const auto [n, i, j, ii, ij, jj, d, id, jd] =
+      sum_near({i_.data(), j_.data(), values_.data(), values_.size()}, before, limit);
   if (n < 6) return std::nullopt;
   // About the centroid, the two slopes are a 2 x 2 system.
   const float cii = ii - i * i / n, cij = ij - i * j / n, cjj = jj - j * j / n;
@@ -49,7 +58,7 @@ std::optional<LocalPlane> Neighbourhood::fit(const LocalPlane& before, float lim
   return LocalPlane{across, down, (d - across * i - down * j) / n};
 }
 
-std::optional<LocalPlane> Neighbourhood::fit() const { return fit({}, std::numeric_limits<float>::infinity()); }
+std::optional<LocalPlane> Neighbourhood::fit() const { return fit({}, std::numeric_limits<float>::max()); }
 
 std::optional<LocalPlane> Neighbourhood::fit_robustly() {
   const auto plane = fit();
@@ -59,11 +68,9 @@ std::optional<LocalPlane> Neighbourhood::fit_robustly() {
 }
 
 std::pair<float, bool> Neighbourhood::median_miss(const LocalPlane& plane) {
-  misses_.clear();
-  for (std::size_t k = 0; k < size(); ++k) misses_.push_back(std::abs(values_[k] - plane.at(i_[k], j_[k])));
-  const auto middle = misses_.begin() + static_cast<std::ptrdiff_t>(misses_.size() / 2);
-  std::nth_element(misses_.begin(), middle, misses_.end());
-  return {*middle, *std::max_element(middle, misses_.end()) > 3 * *middle};
+  const auto [median, largest] =
+      find_misses({i_.data(), j_.data(), values_.data(), values_.size()}, plane, scratch_.data());
+  return {median, largest > 3 * median};
 }
 
 bool is_one_surface(const LocalPlane& plane, const Image<float>& values, const Image<float>& sigmas, int x, int y,

@@ -22,7 +22,7 @@ class Neighbourhood {
   /// The finite values of the (2 radius + 1)^2 pixels around (x, y), less that of (x, y) itself: small differences of
   /// large values stay exact. \pre the value at (x, y) is finite
   void gather(const Image<float>& values, int x, int y, int radius);
-  std::size_t size() const { return values_.size(); }
+  std::size_t size() const;  ///< finite values
 
   /// Least squares over the values that miss `before` by at most `limit`; nothing if they are fewer than six or on
   /// a line.
@@ -33,11 +33,15 @@ class Neighbourhood {
   /// behind an edge.
   std::optional<LocalPlane> fit_robustly();
 
-  /// Median of the distances from a plane, and whether any of them is more than three times as much.
+  /// Median of the distances from a plane, to a hundredth, and whether any of them is more than three times as much.
   std::pair<float, bool> median_miss(const LocalPlane& plane);
 
  private:
-  std::vector<float> i_, j_, values_, misses_;
+  void set_radius(int radius);
+
+  int radius_ = -1;
+  std::vector<float> i_, j_;             ///< places of the window, padded with zeros
+  std::vector<float> values_, scratch_;  ///< NaN where there is none
 };
 
 /// Whether the plane, fitted around (x, y), is that of one surface: every finite value in the window keeps to it

@@ -15,8 +15,8 @@
 namespace pagesweep {
 namespace {
 
-/// What happened before leave() in one thread has happened after enter() in another. TBB sees to that, but it is not built
-/// with the thread sanitizer, which has to be told.
+/// What happened before leave() in one thread has happened after enter() in another. TBB sees to that, but it is not
+/// built with the thread sanitizer, which has to be told.
 class Order {
  public:
 #ifdef __SANITIZE_THREAD__

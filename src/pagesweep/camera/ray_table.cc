@@ -23,7 +23,7 @@ Eigen::Vector2d undistort_from(const BrownConrady& lens, const Eigen::Vector2d& 
 
 }  // namespace
 
-RayTable::RayTable(const Camera& camera) : directions_(camera.width, camera.height) {
+RayTable::RayTable(const Camera& camera) : camera_(camera), directions_(camera.width, camera.height) {
   parallel_rows(camera.height, [&](int y) {
     Eigen::Vector2d guess(-camera.cx / camera.fx, (y - camera.cy) / camera.fy);
     for (int x = 0; x < camera.width; ++x) {

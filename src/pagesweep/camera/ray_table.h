@@ -13,8 +13,9 @@ namespace pagesweep {
 /// A direction is (X/Z, Y/Z) in the camera's frame; NaN where the distortion has no inverse.
 class RayTable {
  public:
-  explicit RayTable(const Camera& camera);
+  RayTable(const Camera& camera);  // NOLINT(*-explicit-*): a camera with all its rays worked out is still that camera
 
+  const Camera& camera() const { return camera_; }
   int width() const { return directions_.width(); }
   int height() const { return directions_.height(); }
   const Eigen::Vector2d& direction(int x, int y) const { return directions_(x, y); }
@@ -23,6 +24,7 @@ class RayTable {
   Eigen::Vector2d direction_at(const Eigen::Vector2d& pixel) const;
 
  private:
+  Camera camera_;
   Image<Eigen::Vector2d> directions_;
 };
 

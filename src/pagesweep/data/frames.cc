@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/data/gray_samples_internal.h"
 
 namespace pagesweep {
 
@@ -43,28 +44,24 @@ void Frames::set(int i, GrayImage image) {
   images_[static_cast<std::size_t>(i)] = std::move(image);
 }
 
-void Frames::read_row(int y, Image<float>& samples) const {
+bool Frames::read_row(int y, Image<float>& samples) const {
   if (samples.width() != width() || samples.height() != count()) samples = Image<float>(width(), count());
-  const auto black = static_cast<float>(sequence_.black_level);
-  const auto clipped = static_cast<float>(sequence_.saturation);
-  constexpr float infinity = std::numeric_limits<float>::infinity();
+  return read_row(y, 0, samples);
+}
+
+bool Frames::read_row(int y, int left, Image<float>& samples) const {
+  bool clipped = false;
   for (int i = 0; i < count(); ++i) {
     const auto out = samples.row(i);
     if (!has(i)) {
       std::fill(out.begin(), out.end(), std::numeric_limits<float>::quiet_NaN());
       continue;
     }
-    const auto scale = static_cast<float>(1 / sequence_.exposure(i));
-    std::visit(
-        [&](const auto& image) {
-          const auto in = image.row(y);
-          for (std::size_t x = 0; x < in.size(); ++x) {
-            const auto gray = static_cast<float>(in[x]);
-            out[x] = gray >= clipped ? infinity : scale * (gray - black);
-          }
-        },
-        frame(i));
+    const GrayScale scale{static_cast<float>(sequence_.black_level), static_cast<float>(sequence_.saturation),
+                          static_cast<float>(1 / sequence_.exposure(i))};
+    std::visit([&](const auto& image) { clipped |= to_samples(&image(left, y), scale, out); }, frame(i));
   }
+  return clipped;
 }
 
 Image<float> brightest(const Frames& frames) {

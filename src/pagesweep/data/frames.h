@@ -60,8 +60,12 @@ class Frames {
   /// samples(x, i) is what pixel (x, y) would show at frame i with the longest exposure and no limit, NaN where the
   /// frame was dropped. A sample that is clipped is +infinity: it says "at least saturation" and nothing more, and no
   /// station can mistake it for a measurement (eq. 10).
-  /// \param samples  count() rows of width() pixels
-  void read_row(int y, Image<float>& samples) const;
+  /// \param samples  becomes count() rows of width() pixels
+  /// \return whether a sample is clipped
+  bool read_row(int y, Image<float>& samples) const;
+  /// The same for the pixels (left, y), (left + 1, y), ..., as many as `samples` has columns.
+  /// \param samples  of count() rows; must fit into the row
+  bool read_row(int y, int left, Image<float>& samples) const;
 
  private:
   Sequence sequence_;

@@ -100,17 +100,15 @@ void evaluate_points(const fs::path& out, const std::vector<CameraData>& cameras
   }
 }
 
-bool has_one_exposure(const SequenceFiles& files) { return relative_exposures(files.exposure_ms, files.count).empty(); }
-
-/// The bound, if the truth tells profile and sensor and all frames are exposed alike.
+/// The bound, if the truth tells profile and sensor.
 BoundOfAmplitude find_bound(const Truth& truth, const std::optional<Capture>& capture) {
   if (!truth.sensor || !truth.profile || !(truth.sensor->gain_e_per_gray > 0) || truth.profile->values.size() < 3)
     return {};
-  if (capture && !std::ranges::all_of(capture->sequences, has_one_exposure)) return {};
-  double clips_at = std::numeric_limits<double>::infinity();
-  if (capture && !capture->sequences.empty())
-    clips_at = capture->sequences[0].saturation - capture->sequences[0].black_level;
-  return TimeBound(*truth.profile, *truth.sensor, clips_at);
+  if (!capture || capture->sequences.empty())
+    return TimeBound(*truth.profile, *truth.sensor, std::numeric_limits<double>::infinity());
+  const SequenceFiles& files = capture->sequences[0];
+  return TimeBound(*truth.profile, *truth.sensor, files.saturation - files.black_level,
+                   relative_exposures(files.exposure_ms, files.count));
 }
 
 void evaluate_times(const std::vector<CameraData>& cameras, const Rig& rig, const BoundOfAmplitude& bound,

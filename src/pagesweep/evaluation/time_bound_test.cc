@@ -33,6 +33,17 @@ TEST(TimeBound, ShotNoiseAndClippingCost) {
   EXPECT_NEAR(clipped(100), noisy(100), 1e-9) << "nothing is clipped";
 }
 
+TEST(TimeBound, FramesCountByTheSquareOfTheirExposure) {
+  // White noise: a frame of half the exposure has a quarter of the information.
+  const TimeBound alike(gaussian(4), {1e12, 1}, 1e9), mixed(gaussian(4), {1e12, 1}, 1e9, {1, 0.5});
+  EXPECT_NEAR(mixed(100) / alike(100), std::sqrt(2 / 1.25), 1e-3);
+  // Only the long exposure is clipped, where light exceeds half of the amplitude.
+  const TimeBound whole(gaussian(4), {40, 1}, 1e9, {1, 0.5}), clipped(gaussian(4), {40, 1}, 50, {1, 0.5});
+  EXPECT_GT(clipped(99), 1.05 * whole(99));
+  EXPECT_LT(clipped(99), 2 * whole(99)) << "the short exposure still sees the tip";
+  EXPECT_NEAR(clipped(49), whole(49), 1e-9) << "nothing is clipped";
+}
+
 TEST(TimeBound, RefusesWhatSaysNothing) {
   EXPECT_THROW(TimeBound({0, 1, {1, 1}}, {40, 1}, 250), std::invalid_argument);
   EXPECT_THROW(TimeBound(gaussian(4), {0, 1}, 250), std::invalid_argument);

@@ -7,6 +7,8 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "pagesweep/base/local_plane.h"
@@ -14,6 +16,8 @@
 
 namespace pagesweep {
 namespace {
+
+constexpr float negligible_px = 0.02f;  ///< an offset that no time value would notice
 
 /// Light of an sRGB sample between 0 and 1 (IEC 61966-2-1).
 float light_of(double sample) {
@@ -59,6 +63,21 @@ ScanPositions project(const PointMap& points, const Scanner& scanner) {
   return positions;
 }
 
+/// By how much the place in the scan moves from one pixel of the camera to the next [px], median.
+float typical_step(const ScanPositions& positions) {
+  std::vector<float> steps;
+  for (int y = 0; y + 1 < positions.u.height(); y += 5)
+    for (int x = 0; x + 1 < positions.u.width(); x += 5)
+      for (const auto& [i, j] : {std::pair{x + 1, y}, {x, y + 1}}) {
+        const float step = std::hypot(positions.u(i, j) - positions.u(x, y), positions.v(i, j) - positions.v(x, y));
+        if (std::isfinite(step)) steps.push_back(step);
+      }
+  if (steps.empty()) return 1;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
 /// The scan around one pixel: position(d) = middle + by_pixel d, for places d [px] in the camera's picture.
 struct ScanPatch {
   Eigen::Vector2f middle;
@@ -67,7 +86,6 @@ struct ScanPatch {
 
 std::optional<ScanPatch> patch_around(const ScanPositions& positions, Neighbourhood& around, int x, int y) {
   constexpr int radius = 2;
-  if (!std::isfinite(positions.u(x, y))) return std::nullopt;
   around.gather(positions.u, x, y, radius);
   const auto u = around.fit_robustly();
   around.gather(positions.v, x, y, radius);
@@ -109,6 +127,47 @@ float sample(const Image<float>& light, const Eigen::Vector2f& position) {
   return above + b * (below - above);
 }
 
+/// The lowest and highest light around every place of the scan, for a quick answer to whether something is printed.
+class Contrast {
+ public:
+  /// \param reach_px  of the surroundings, at least
+  Contrast(const Image<float>& light, float reach_px)
+      : side_(std::max(1, static_cast<int>(std::ceil(reach_px)))),
+        low_((light.width() + side_ - 1) / side_, (light.height() + side_ - 1) / side_),
+        high_(low_.width(), low_.height()) {
+    Image<float> low(low_.width(), low_.height()), high = low;
+    parallel_rows(low.height(), [&](int row) {
+      for (int column = 0; column < low.width(); ++column)
+        std::tie(low(column, row), high(column, row)) = range_of(light, light, column * side_, row * side_, side_);
+    });
+    parallel_rows(low.height(), [&](int row) {
+      for (int column = 0; column < low.width(); ++column)
+        std::tie(low_(column, row), high_(column, row)) = range_of(low, high, column - 1, row - 1, 3);
+    });
+  }
+
+  /// (high - low) / (high + low) of all that lies within reach of a place in the scan, and of a little more.
+  float around(const Eigen::Vector2f& place) const {
+    const int column = std::clamp(static_cast<int>(place.x()) / side_, 0, low_.width() - 1);
+    const int row = std::clamp(static_cast<int>(place.y()) / side_, 0, low_.height() - 1);
+    return (high_(column, row) - low_(column, row)) / (high_(column, row) + low_(column, row));
+  }
+
+ private:
+  /// Over a square of pixels, as far as it lies inside.
+  static std::pair<float, float> range_of(const Image<float>& low, const Image<float>& high, int left, int top,
+                                          int side) {
+    std::pair<float, float> range{std::numeric_limits<float>::infinity(), 0};
+    for (int y = std::max(0, top); y < std::min(low.height(), top + side); ++y)
+      for (int x = std::max(0, left); x < std::min(low.width(), left + side); ++x)
+        range = {std::min(range.first, low(x, y)), std::max(range.second, high(x, y))};
+    return range;
+  }
+
+  int side_;  ///< [px] of a square whose range is known
+  Image<float> low_, high_;
+};
+
 /// NaN if a place is outside the scan or all of them are black.
 Eigen::Vector2f middle_of(const Spot& spot, const ScanPatch& patch, const Image<float>& light) {
   Eigen::Vector2f moment = Eigen::Vector2f::Zero();
@@ -131,10 +190,20 @@ SpotOffsets weigh_footprints(const PointMap& points, const Scanner& scanner, con
   const Image<float> light = light_of(scan);
   const ScanPositions positions = project(points, scanner);
   const Spot spot(spot_variance_px2);
+  const auto sigma_px = static_cast<float>(std::sqrt(spot_variance_px2));
+  const float usual_px = 3 * sigma_px * typical_step(positions);
+  const Contrast contrast(light, 1.5f * usual_px);
   SpotOffsets offsets(points.width(), points.height());
   parallel_rows(points.height(), [&](int y) {
     Neighbourhood around;
     for (int x = 0; x < points.width(); ++x) {
+      const Eigen::Vector2f middle_px(positions.u(x, y), positions.v(x, y));
+      if (!std::isfinite(middle_px.x())) continue;
+      // A sharp edge through the middle would move it by sqrt(2 / pi) sigma contrast: no way to get further.
+      if (0.8f * sigma_px * contrast.around(middle_px) < negligible_px) {
+        offsets.dx(x, y) = offsets.dy(x, y) = 0;
+        continue;
+      }
       const auto patch = patch_around(positions, around, x, y);
       if (!patch) continue;
       const Eigen::Vector2f middle = middle_of(spot, *patch, light);

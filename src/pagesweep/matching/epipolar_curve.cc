@@ -35,15 +35,15 @@ void keep_where_positive(double c0, double c1, InverseDepthRange& range) {
 
 }  // namespace
 
-View::View(const Camera& camera, const RayTable& rays)
-    : lens_(camera.distortion),
-      fx_(camera.fx),
-      fy_(camera.fy),
-      cx_(camera.cx),
-      cy_(camera.cy),
-      max_u_(camera.width - 0.5),
-      max_v_(camera.height - 0.5),
-      max_radius_squared_(largest_valid_radius_squared(camera.distortion)),
+View::View(const RayTable& rays)
+    : lens_(rays.camera().distortion),
+      fx_(rays.camera().fx),
+      fy_(rays.camera().fy),
+      cx_(rays.camera().cx),
+      cy_(rays.camera().cy),
+      max_u_(rays.width() - 0.5),
+      max_v_(rays.height() - 0.5),
+      max_radius_squared_(largest_valid_radius_squared(lens_)),
       lowest_(Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity())),
       highest_(-lowest_) {
   for (int y = 0; y < rays.height(); ++y)
@@ -105,11 +105,10 @@ void sample(const EpipolarCurve& curve, CurveSamples& samples) {
   }
 }
 
-EpipolarGeometry::EpipolarGeometry(const Camera& from, const RayTable& from_rays, const Camera& to,
-                                   const RayTable& to_rays, InverseDepthRange range)
-    : from_rays_(&from_rays),
-      view_(to, to_rays),
-      to_from_from_(to.cam_from_rig * from.cam_from_rig.inverse()),
+EpipolarGeometry::EpipolarGeometry(const RayTable& from, const RayTable& to, InverseDepthRange range)
+    : from_rays_(&from),
+      view_(to),
+      to_from_from_(to.camera().cam_from_rig * from.camera().cam_from_rig.inverse()),
       range_(range) {}
 
 EpipolarCurve EpipolarGeometry::curve(int x, int y) const {

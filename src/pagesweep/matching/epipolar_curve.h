@@ -22,7 +22,7 @@ struct InverseDepthRange {
 /// A camera that is looked into, made ready to project a million points.
 class View {
  public:
-  View(const Camera& camera, const RayTable& rays);
+  explicit View(const RayTable& camera);
 
   /// Where a point of the camera's frame is imaged; nothing if the picture does not show it.
   std::optional<Eigen::Vector2d> locate(const Eigen::Vector3d& point) const {
@@ -90,9 +90,9 @@ void sample(const EpipolarCurve& curve, CurveSamples& samples);
 /// All epipolar curves of one camera in another.
 class EpipolarGeometry {
  public:
-  /// The tables must be those of the cameras and must outlive this. \param range  of depths in `from`
-  EpipolarGeometry(const Camera& from, const RayTable& from_rays, const Camera& to, const RayTable& to_rays,
-                   InverseDepthRange range);
+  /// \param from   must outlive this
+  /// \param range  of depths in `from`
+  EpipolarGeometry(const RayTable& from, const RayTable& to, InverseDepthRange range);
   EpipolarCurve curve(int x, int y) const;
   const InverseDepthRange& range() const { return range_; }
 

@@ -217,15 +217,15 @@ Match TimeFinder::match_at(double root, const Wanted& wanted) const {
   return {PixelStatus::ok, *pixel, sigma_px, root, slope};
 }
 
-void require_size(const TimeMap& map, const Camera& camera) {
-  if (map.width() != camera.width || map.height() != camera.height)
+void require_size(const TimeMap& map, const RayTable& camera) {
+  if (map.width() != camera.width() || map.height() != camera.height())
     throw std::invalid_argument("match_times: a time map is not of its camera's size");
 }
 
 }  // namespace
 
-MatchPair match_times(const TimeMap& first, const TimeMap& second, const Camera& first_camera,
-                      const Camera& second_camera, const MatchOptions& options, Progress& progress) {
+MatchPair match_times(const TimeMap& first, const TimeMap& second, const RayTable& first_camera,
+                      const RayTable& second_camera, const MatchOptions& options, Progress& progress) {
   require_size(first, first_camera);
   require_size(second, second_camera);
   const TimeField first_field(first), second_field(second);

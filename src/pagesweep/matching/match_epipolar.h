@@ -6,7 +6,7 @@
 
 #include "pagesweep/base/enum_names.h"
 #include "pagesweep/base/progress.h"
-#include "pagesweep/camera/camera.h"
+#include "pagesweep/camera/ray_table.h"
 #include "pagesweep/data/correspondences.h"
 #include "pagesweep/data/time_map.h"
 
@@ -67,8 +67,8 @@ struct MatchPair {
 /// bracketed; sigma follows from both time values' sigma and the slope of time along the curve. Both directions must
 /// agree. docs/derivations/matching.md has the equations and says when a pixel gets which status.
 /// \throws std::invalid_argument  if a map's size is not its camera's, or near_mm, far_mm contradict each other
-MatchPair match_times(const TimeMap& first, const TimeMap& second, const Camera& first_camera,
-                      const Camera& second_camera, const MatchOptions& options = {},
+MatchPair match_times(const TimeMap& first, const TimeMap& second, const RayTable& first_camera,
+                      const RayTable& second_camera, const MatchOptions& options = {},
                       Progress& progress = no_progress());
 
 }  // namespace pagesweep

@@ -151,15 +151,15 @@ class SequenceMatcher final : public Matcher {
   const MatchOptions& options_;
 };
 
-void require_size(const Frames& frames, const Camera& camera) {
-  if (frames.width() != camera.width || frames.height() != camera.height)
+void require_size(const Frames& frames, const RayTable& camera) {
+  if (frames.width() != camera.width() || frames.height() != camera.height())
     throw std::invalid_argument("match_sequences: the frames are not of their camera's size");
 }
 
 }  // namespace
 
-MatchPair match_sequences(const Frames& first, const Frames& second, const Camera& first_camera,
-                          const Camera& second_camera, const MatchOptions& options, Progress& progress) {
+MatchPair match_sequences(const Frames& first, const Frames& second, const RayTable& first_camera,
+                          const RayTable& second_camera, const MatchOptions& options, Progress& progress) {
   require_size(first, first_camera);
   require_size(second, second_camera);
   std::vector<int> instants;  // at which both cameras have a frame

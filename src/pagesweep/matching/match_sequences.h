@@ -14,8 +14,8 @@ namespace pagesweep {
 /// Memory: two bytes for each sample of both cameras.
 /// \throws std::invalid_argument  if frames and camera differ in size, or near_mm, far_mm contradict each other
 /// \throws Error  no_result if the cameras share fewer than 3 frames
-MatchPair match_sequences(const Frames& first, const Frames& second, const Camera& first_camera,
-                          const Camera& second_camera, const MatchOptions& options = {},
+MatchPair match_sequences(const Frames& first, const Frames& second, const RayTable& first_camera,
+                          const RayTable& second_camera, const MatchOptions& options = {},
                           Progress& progress = no_progress());
 
 }  // namespace pagesweep

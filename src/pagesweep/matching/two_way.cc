@@ -18,13 +18,11 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// One camera's pixels and the other camera's picture.
 struct Direction {
-  const Camera* from;
-  const Camera* to;
-  const RayTable* from_rays;
-  const RayTable* to_rays;
+  const RayTable* from;
+  const RayTable* to;
   const Matcher* matcher;
 
-  EpipolarGeometry geometry(InverseDepthRange range) const { return {*from, *from_rays, *to, *to_rays, range}; }
+  EpipolarGeometry geometry(InverseDepthRange range) const { return {*from, *to, range}; }
 };
 
 Match find(const Direction& direction, const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y,
@@ -48,7 +46,7 @@ InverseDepthRange allowed_range(const Camera& first, const Camera& second, const
 /// Inverse depths of a grid of pixels, kept if the matched pixel's own match leads back.
 std::vector<double> probe_depths(const Direction& there, const Direction& back, InverseDepthRange range) {
   const EpipolarGeometry geometry = there.geometry(range), return_geometry = back.geometry(range);
-  const int width = there.from->width, height = there.from->height;
+  const int width = there.from->width(), height = there.from->height();
   const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / 20000.0)));
   std::vector<std::vector<double>> rows(static_cast<std::size_t>((height + stride - 1) / stride));
   parallel_rows(static_cast<int>(rows.size()), [&](int row) {
@@ -57,8 +55,8 @@ std::vector<double> probe_depths(const Direction& there, const Direction& back, 
       const int y = std::min(row * stride + stride / 2, height - 1);
       const Match match = find(there, geometry, *finder, x, y, nan);
       if (match.status != PixelStatus::ok) continue;
-      const int u = std::clamp(static_cast<int>(std::lround(match.pixel.x())), 0, there.to->width - 1);
-      const int v = std::clamp(static_cast<int>(std::lround(match.pixel.y())), 0, there.to->height - 1);
+      const int u = std::clamp(static_cast<int>(std::lround(match.pixel.x())), 0, there.to->width() - 1);
+      const int v = std::clamp(static_cast<int>(std::lround(match.pixel.y())), 0, there.to->height() - 1);
       const Match returned = find(back, return_geometry, *return_finder, u, v, nan);
       const bool agrees = returned.status == PixelStatus::ok && (returned.pixel - Eigen::Vector2d(x, y)).norm() < 3;
       if (agrees) rows[static_cast<std::size_t>(row)].push_back(match.inverse_depth);
@@ -84,8 +82,8 @@ InverseDepthRange narrow(InverseDepthRange allowed, std::vector<double> depths) 
 Correspondences match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress) {
   constexpr int band = 32;  // rows between two reports of progress
   const EpipolarGeometry geometry = direction.geometry(range);
-  Correspondences matches(direction.from->width, direction.from->height);
-  progress.begin(fmt::format("matching {} with {}", direction.from->name, direction.to->name));
+  Correspondences matches(direction.from->width(), direction.from->height());
+  progress.begin(fmt::format("matching {} with {}", direction.from->camera().name, direction.to->camera().name));
   for (int top = 0; top < matches.height(); top += band) {
     parallel_rows(std::min(band, matches.height() - top), [&](int row) {
       const int y = top + row;
@@ -109,12 +107,10 @@ Correspondences match_one_way(const Direction& direction, InverseDepthRange rang
 
 }  // namespace
 
-MatchPair match_both_ways(const Camera& first, const Camera& second, const Matcher& from_first,
+MatchPair match_both_ways(const RayTable& first, const RayTable& second, const Matcher& from_first,
                           const Matcher& from_second, const MatchOptions& options, Progress& progress) {
-  const InverseDepthRange allowed = allowed_range(first, second, options);
-  const RayTable first_rays(first), second_rays(second);
-  const Direction there{&first, &second, &first_rays, &second_rays, &from_first};
-  const Direction back{&second, &first, &second_rays, &first_rays, &from_second};
+  const InverseDepthRange allowed = allowed_range(first.camera(), second.camera(), options);
+  const Direction there{&first, &second, &from_first}, back{&second, &first, &from_second};
   InverseDepthRange first_range = allowed, second_range = allowed;
   if (options.near_mm == 0 || options.far_mm == 0) {
     first_range = narrow(allowed, probe_depths(there, back, allowed));

@@ -43,7 +43,7 @@ class Matcher {
 };
 
 /// Matches all pixels both ways, finding the depth ranges first where they are not given, and keeps what agrees.
-MatchPair match_both_ways(const Camera& first, const Camera& second, const Matcher& from_first,
+MatchPair match_both_ways(const RayTable& first, const RayTable& second, const Matcher& from_first,
                           const Matcher& from_second, const MatchOptions& options, Progress& progress);
 
 }  // namespace pagesweep

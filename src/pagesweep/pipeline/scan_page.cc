@@ -7,9 +7,11 @@
 #include <cmath>
 
 #include "pagesweep/base/error.h"
+#include "pagesweep/camera/ray_table.h"
 #include "pagesweep/footprint/weigh_footprints.h"
 #include "pagesweep/matching/match_sequences.h"
 #include "pagesweep/timing/pairwise.h"
+#include "pagesweep/triangulation/normals.h"
 #include "pagesweep/triangulation/section_light.h"
 
 namespace pagesweep {
@@ -38,9 +40,16 @@ std::vector<Camera> cameras_of(const FrameSource& source, const Rig& rig, Matche
   return cameras;
 }
 
-MatchPair match(const std::vector<Frames>& frames, const Measurement& measurement, const ScanOptions& options,
-                Progress& progress) {
-  const auto& cameras = measurement.cameras;
+/// What the stations work with: the cameras' rays are worked out once.
+struct Stage {
+  const Rig& rig;
+  const ScanOptions& options;
+  const std::vector<Frames>& frames;
+  const std::vector<RayTable> cameras;
+};
+
+MatchPair match(const Stage& stage, const Measurement& measurement, Progress& progress) {
+  const auto& [rig, options, frames, cameras] = stage;
   if (options.matcher == Matcher::sequence)
     return match_sequences(frames[0], frames[1], cameras[0], cameras[1], options.matching, progress);
   const auto& times = measurement.timing->maps;
@@ -52,41 +61,55 @@ MatchPair match(const std::vector<Frames>& frames, const Measurement& measuremen
   return matches;
 }
 
-/// The stereo points calibrate the sheet of light, which then takes part in them.
-void fuse(const MatchPair& matches, const ScanOptions& options, Measurement& measurement) {
-  const auto& cameras = measurement.cameras;
-  const auto& times = measurement.timing->maps;
-  measurement.sweep = calibrate_light(measurement.points, times);
-  measurement.fusion.clear();
-  if (!measurement.sweep) return;
-  const Light& light = measurement.sweep->light;
-  measurement.fusion.push_back(fuse_light(measurement.points[0], matches.from_first, times[0], cameras[0], cameras[1],
-                                          light, options.triangulation));
-  measurement.fusion.push_back(fuse_light(measurement.points[1], matches.from_second, times[1], cameras[1], cameras[0],
-                                          light, options.triangulation));
+std::vector<PointMap> triangulate_both(const MatchPair& matches, const Stage& stage, const Measurement& measurement) {
+  const auto intensity = [&](std::size_t c) {
+    return measurement.timing ? measurement.timing->maps[c].amplitude : brightest(stage.frames[c]);
+  };
+  const auto& cameras = stage.cameras;
+  const TriangulationOptions& options = stage.options.triangulation;
+  return {triangulate(matches.from_first, intensity(0), cameras[0], cameras[1], options),
+          triangulate(matches.from_second, intensity(1), cameras[1], cameras[0], options)};
 }
 
-/// Points from the time maps (from the frames, for the sequence matcher), in place of any that are there.
-void find_points(const std::vector<Frames>& frames, const Rig& rig, const ScanOptions& options,
-                 Measurement& measurement, Progress& progress) {
-  measurement.points.clear();
-  const auto& cameras = measurement.cameras;
-  if (options.matcher == Matcher::light_section) {
-    for (std::size_t c = 0; c < cameras.size(); ++c)
-      measurement.points.push_back(
-          section_light(measurement.timing->maps[c], cameras[c], *rig.light, options.triangulation));
-    return;
+std::vector<PointMap> section_each(const Stage& stage, const Measurement& measurement) {
+  std::vector<PointMap> points;
+  for (std::size_t c = 0; c < stage.cameras.size(); ++c)
+    points.push_back(
+        section_light(measurement.timing->maps[c], stage.cameras[c], *stage.rig.light, stage.options.triangulation));
+  return points;
+}
+
+/// The stereo points calibrate the sheet of light, which then takes part in them.
+void fuse(const MatchPair& matches, const Stage& stage, Measurement& measurement) {
+  const auto& cameras = stage.cameras;
+  const auto& times = measurement.timing->maps;
+  measurement.sweep = calibrate_light(measurement.points, times);
+  if (!measurement.sweep) return;
+  const Light& light = measurement.sweep->light;
+  const TriangulationOptions& options = stage.options.triangulation;
+  measurement.fusion = {
+      fuse_light(measurement.points[0], matches.from_first, times[0], cameras[0], cameras[1], light, options),
+      fuse_light(measurement.points[1], matches.from_second, times[1], cameras[1], cameras[0], light, options)};
+}
+
+/// Points from the time maps; from the frames, for the sequence matcher.
+void find_points(const Stage& stage, Measurement& measurement, Progress& progress) {
+  if (stage.options.matcher == Matcher::light_section) {
+    measurement.points = section_each(stage, measurement);
+  } else {
+    const MatchPair matches = match(stage, measurement, progress);
+    progress.begin("triangulating");
+    measurement.points = triangulate_both(matches, stage, measurement);
+    if (stage.options.fusion && measurement.timing) fuse(matches, stage, measurement);
   }
-  const MatchPair matches = match(frames, measurement, options, progress);
-  const auto intensity = [&](std::size_t c) {
-    return measurement.timing ? measurement.timing->maps[c].amplitude : brightest(frames[c]);
-  };
-  progress.begin("triangulating");
-  measurement.points.push_back(
-      triangulate(matches.from_first, intensity(0), cameras[0], cameras[1], options.triangulation));
-  measurement.points.push_back(
-      triangulate(matches.from_second, intensity(1), cameras[1], cameras[0], options.triangulation));
-  if (options.fusion && measurement.timing) fuse(matches, options, measurement);
+  for (std::size_t c = 0; c < stage.cameras.size(); ++c)
+    fit_normals(measurement.points[c], stage.cameras[c], stage.options.triangulation.normal_radius_px);
+}
+
+/// Points that are good enough to look up what is printed there.
+std::vector<PointMap> find_rough_points(const Stage& stage, const Measurement& measurement, Progress& progress) {
+  if (stage.options.matcher == Matcher::light_section) return section_each(stage, measurement);
+  return triangulate_both(match(stage, measurement, progress), stage, measurement);
 }
 
 /// Each camera's times, moved to the pixels' centres by what its own amplitudes tell of the print.
@@ -101,12 +124,12 @@ void correct_by_amplitude(const std::vector<TimeMap>& seen, Measurement& measure
 
 /// Likewise by what the scan tells, where the first measurement can look it up, and only if it explains the times
 /// better: a scan that does not lie where the rig says is no witness.
-void correct_by_scan(const std::vector<TimeMap>& seen, const Scanner& scanner, const Picture& scan,
-                     Measurement& measurement) {
+void correct_by_scan(const std::vector<TimeMap>& seen, const std::vector<PointMap>& points, const Scanner& scanner,
+                     const Picture& scan, Measurement& measurement) {
   for (std::size_t c = 0; c < seen.size(); ++c) {
     const double spot_variance_px2 = measurement.edges[c].gain;
     if (!(spot_variance_px2 > 0)) continue;
-    const SpotOffsets offsets = weigh_footprints(measurement.points[c], scanner, scan, spot_variance_px2);
+    const SpotOffsets offsets = weigh_footprints(points[c], scanner, scan, spot_variance_px2);
     const auto comparisons = compare_with_surroundings(seen[c], offsets);
     const EdgeCorrection correction = fit_edges(seen[c], comparisons);
     if (!(correction.after < measurement.edges[c].after)) continue;
@@ -144,19 +167,23 @@ Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& 
     measurement.dropped_frames.push_back(sequence.dropped());
     measurement.clipped_frames.push_back(count_clipped(sequence));
   }
+  const Stage stage{rig, options, frames, {measurement.cameras.begin(), measurement.cameras.end()}};
   if (options.matcher == Matcher::sequence) {
-    find_points(frames, rig, options, measurement, progress);
+    find_points(stage, measurement, progress);
     return measurement;
   }
   measurement.timing = estimate_times(frames, options.timing, progress);
   const std::vector<TimeMap> seen = measurement.timing->maps;
-  if (options.edges != EdgeWitness::none) correct_by_amplitude(seen, measurement);
-  find_points(frames, rig, options, measurement, progress);
-  if (options.edges == EdgeWitness::scan && scan && rig.scanner) {
-    progress.begin("looking up the print in the scan");
-    correct_by_scan(seen, *rig.scanner, *scan, measurement);
-    find_points(frames, rig, options, measurement, progress);
+  if (options.edges != EdgeWitness::none) {
+    progress.begin("looking for print");
+    correct_by_amplitude(seen, measurement);
   }
+  if (options.edges == EdgeWitness::scan && scan && rig.scanner) {
+    const std::vector<PointMap> rough = find_rough_points(stage, measurement, progress);
+    progress.begin("looking up the print in the scan");
+    correct_by_scan(seen, rough, *rig.scanner, *scan, measurement);
+  }
+  find_points(stage, measurement, progress);
   return measurement;
 }
 

@@ -9,15 +9,12 @@ namespace pagesweep {
 
 TimeVariance time_variance(std::span<const BellSample> bell, double amplitude_gray, const SampleNoise& noise) {
   const double constant = noise.read_variance + noise.rounding_variance;
-  const auto gradient = [&](const BellSample& sample) {
-    return Eigen::Vector3d(-amplitude_gray * sample.slope, sample.light, 1);  // by t, A, b
+  const auto gray = [&](const BellSample& sample) { return sample.exposure * amplitude_gray * sample.light; };
+  const auto gradient = [&](const BellSample& sample) -> Eigen::Vector3d {  // by t, A, b
+    return sample.exposure * Eigen::Vector3d(-amplitude_gray * sample.slope, sample.light, 1);
   };
-  const auto variance = [&](const BellSample& sample) {
-    return noise.shot_gray * amplitude_gray * sample.light + constant;
-  };
-  const auto is_clipped = [&](const BellSample& sample) {
-    return amplitude_gray * sample.light >= noise.clips_at_gray;
-  };
+  const auto variance = [&](const BellSample& sample) { return noise.shot_gray * gray(sample) + constant; };
+  const auto is_clipped = [&](const BellSample& sample) { return gray(sample) >= noise.clips_at_gray; };
 
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   for (const BellSample& sample : bell)

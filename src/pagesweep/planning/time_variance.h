@@ -7,11 +7,13 @@ namespace pagesweep {
 
 /// One sample of a pixel's bell A p(i - t) + b: p, highest value 1, and its slope.
 struct BellSample {
-  double light = 0;  ///< p(i - t)
-  double slope = 0;  ///< p'(i - t) [1/frame]
+  double light = 0;     ///< p(i - t)
+  double slope = 0;     ///< p'(i - t) [1/frame]
+  double exposure = 1;  ///< of its frame, relative to that for which the amplitude is meant
 };
 
-/// Noise of one sample after EMVA 1288's linear camera: its variance is shot_gray * (gray value) + read + rounding.
+/// Noise of one sample as the sensor has it, after EMVA 1288's linear camera: its variance is shot_gray * (gray value)
+/// + read + rounding.
 struct SampleNoise {
   double shot_gray = 0;                 ///< [gray values] variance a gray value: 1 / (electrons a gray value)
   double read_variance = 0;             ///< [gray values^2]

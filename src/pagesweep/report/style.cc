@@ -3,8 +3,9 @@
 
 namespace pagesweep {
 
-std::string_view report_style() {
-  return R"css(
+namespace {
+
+constexpr std::string_view style = R"css(
 :root { color-scheme: light dark;
   --paper: #fbfaf8; --card: #ffffff; --ink: #22252b; --soft: #666c77; --line: #e3e1dc; --accent: #2f6f8f;
   --good: #2e8b57; --look: #c98a1b; --scan_again: #c0392b; }
@@ -66,6 +67,9 @@ footer { margin-top: 4rem; color: var(--soft); font-size: .82rem; }
   body { padding: 0; max-width: none; font-size: 10pt; } h2 { margin-top: 1.6rem; }
   figure, .verdict, tr { break-inside: avoid; } h2, h3, .lead { break-after: avoid; } }
 )css";
-}
+
+}  // namespace
+
+std::string_view report_style() { return style; }
 
 }  // namespace pagesweep

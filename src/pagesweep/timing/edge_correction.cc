@@ -13,6 +13,8 @@ namespace {
 
 /// Offsets beyond are the work of something else than an edge of print.
 constexpr float largest_offset_px = 2;
+/// [standard deviations] A leaning that no gain below 1 px^2 makes as large as that tells and corrects nothing.
+constexpr float least_leaning = 0.2f;
 
 /// Derivative of the samples at -2..2 at the middle one, exact for cubics; over fewer neighbours at borders.
 float derivative(float before2, float before, float after, float after2) {
@@ -28,28 +30,32 @@ class Surroundings {
   EdgeComparison look(int x, int y) {
     const float dx = offsets_.dx(x, y), dy = offsets_.dy(x, y);
     if (times_.status(x, y) != PixelStatus::ok || !(std::abs(dx) + std::abs(dy) < largest_offset_px)) return {};
+    const auto [least, most] = frames_a_pixel(x, y);
+    if (std::hypot(dx, dy) * most < least_leaning * times_.sigma(x, y)) return {};
     around_.gather(times_.time, x, y, radius);
     const auto plane = around_.fit_robustly();
     if (!plane) return {};
-    return {-plane->middle, dx * plane->across + dy * plane->down, std::hypot(dx, dy), frames_a_pixel(x, y),
+    return {-plane->middle, dx * plane->across + dy * plane->down, std::hypot(dx, dy), least,
             is_one_surface(*plane, times_.time, times_.sigma, x, y, radius)};
   }
 
  private:
   static constexpr int radius = 3;
 
-  /// From the more equal of the neighbours on either side: between the others there may be a step.
-  float frames_a_pixel(int x, int y) const {
-    const auto step = [&](int dx, int dy) {
-      const auto difference = [&](int sign) {
-        const int column = x + sign * dx, row = y + sign * dy;
-        return times_.time.contains(column, row) ? std::abs(times_.time(column, row) - times_.time(x, y))
-                                                 : not_a_number;
-      };
-      const float least = std::fmin(difference(1), difference(-1));  // passes over NaN
-      return std::isfinite(least) ? least : 0;
+  struct Range {
+    float least, most;
+  };
+  /// What the stripe takes from pixel to pixel: from the more equal of the neighbours on either side, as between the
+  /// others there may be a step, and from the less equal ones.
+  Range frames_a_pixel(int x, int y) const {
+    const auto difference = [&](int dx, int dy) {
+      const bool inside = times_.time.contains(x + dx, y + dy);
+      return inside ? std::abs(times_.time(x + dx, y + dy) - times_.time(x, y)) : not_a_number;
     };
-    return std::hypot(step(1, 0), step(0, 1));
+    const auto number = [](float value) { return std::isfinite(value) ? value : 0; };  // fmin, fmax pass over one NaN
+    const float right = difference(1, 0), left = difference(-1, 0), below = difference(0, 1), above = difference(0, -1);
+    return {std::hypot(number(std::fmin(right, left)), number(std::fmin(below, above))),
+            std::hypot(number(std::fmax(right, left)), number(std::fmax(below, above)))};
   }
 
   const TimeMap& times_;
@@ -72,8 +78,7 @@ Sums gather(const TimeMap& times, const Image<EdgeComparison>& comparisons, doub
     if (!seen.one_surface) continue;
     const double sigma = times.sigma.data()[i];
     const double leaning = seen.leaning / sigma, misfit = seen.misfit / sigma, rest = misfit - gain * leaning;
-    // A leaning that no gain below 1 px^2 makes as large as a fifth of the noise tells nothing.
-    if (!(std::abs(leaning) >= 0.2) || !(std::abs(rest) < limit)) continue;
+    if (!(std::abs(leaning) >= least_leaning) || !(std::abs(rest) < limit)) continue;
     const double square = leaning * leaning;
     sums.ll += square;
     sums.lm += leaning * misfit;

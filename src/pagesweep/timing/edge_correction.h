@@ -20,7 +20,8 @@ struct EdgeComparison {
   bool one_surface = false;      ///< there is no step in depth nearby
 };
 
-/// Compares each time value that has an offset with the plane through those around it.
+/// Compares each time value whose offset could matter with the plane through those around it: where offset times
+/// steepness is far below the value's standard deviation, there is nothing to compare.
 /// \throws std::invalid_argument  if the sizes differ
 Image<EdgeComparison> compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets);
 

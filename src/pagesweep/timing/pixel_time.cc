@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pagesweep/timing/pixel_time.h"
+#include "pagesweep/timing/pixel_time_internal.h"
 
 #include <algorithm>
 #include <array>
@@ -61,7 +61,18 @@ bool misfits(const PixelWindow& window, const Bell& bell, const PixelJudge& judg
 }
 
 /// Reduced chi square beyond which noise cannot be the reason any more: four standard deviations.
-double noise_limit(const BellFit& fit) { return 1 + 4 * std::sqrt(2.0 / std::max(1, fit.samples - 3)); }
+double noise_limit(int samples) { return 1 + 4 * std::sqrt(2.0 / std::max(1, samples - 3)); }
+
+bool is_lost_in_noise(const Bell& bell, const PixelJudge& judge) {
+  // 0.75 times the width at half height: sum of the squared profile of any bell-like stripe.
+  const double light = 0.75 * judge.profile.full_width_half_maximum() * bell.width * judge.noise.mean_weight();
+  return bell.amplitude < 5 * std::sqrt(judge.noise.sensor().variance(bell.background) / light);
+}
+
+bool is_too_faint(const Bell& bell, double sigma, const PixelJudge& judge) {
+  constexpr double least_amplitude = 3;  // [gray values] below that, rounding makes the shape
+  return bell.amplitude < std::max(judge.min_amplitude, least_amplitude) || sigma > judge.max_sigma;
+}
 
 /// The bell's middle part on a curved background. Half a width at half height beyond the half-height points a bell has
 /// nearly ended; a wider piece would need a more flexible background.
@@ -99,12 +110,8 @@ PixelTime describe(const PixelWindow& window, const Bell& bell, double sigma, do
 
 PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma, const PixelJudge& judge) {
   constexpr double least_recorded = 0.6, least_usable = 0.02, most_misfit = 0.1;
-  constexpr double least_amplitude = 3;  // [gray values] below that, rounding makes the shape
   if (!std::isfinite(bell.time) || !std::isfinite(sigma)) return PixelStatus::bad_fit;
-  // 0.75 times the width at half height: sum of the squared profile of any bell-like stripe.
-  const double light = 0.75 * judge.profile.full_width_half_maximum() * bell.width * judge.noise.mean_weight();
-  if (bell.amplitude < 5 * std::sqrt(judge.noise.sensor().variance(bell.background) / light))
-    return PixelStatus::too_dark;
+  if (is_lost_in_noise(bell, judge)) return PixelStatus::too_dark;
   if (bell.time < 0 || bell.time > judge.frame_count - 1) return PixelStatus::truncated;
   const auto flanks = examine_flanks(window, bell, judge);
   for (const Flank& flank : flanks)
@@ -112,10 +119,24 @@ PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma
   for (const Flank& flank : flanks)
     if (flank.usable < least_usable * flank.whole)
       return flank.clipped > 0 ? PixelStatus::saturated : PixelStatus::truncated;
-  if (bell.amplitude < std::max(judge.min_amplitude, least_amplitude) || sigma > judge.max_sigma)
-    return PixelStatus::too_dark;
+  if (is_too_faint(bell, sigma, judge)) return PixelStatus::too_dark;
   if (!judge.refuse_misfits) return PixelStatus::ok;
   return misfits(window, bell, judge, most_misfit) ? PixelStatus::bad_fit : PixelStatus::ok;
+}
+
+std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double width, const PixelJudge& judge) {
+  if (!fit.converged) return std::nullopt;
+  const double chi_square = fit.chi_square / std::max(1, fit.samples - 3), limit = noise_limit(fit.samples);
+  if (judge.refuse_misfits && chi_square > limit) return std::nullopt;
+  const Bell bell{fit.amplitude, fit.background, fit.time, width};
+  const double sigma = std::sqrt(std::max(1.0, chi_square / limit)) * fit.time_sigma;
+  const bool dark = is_lost_in_noise(bell, judge) || is_too_faint(bell, sigma, judge);
+  return PixelTime{.time = fit.time,
+                   .sigma = sigma,
+                   .amplitude = fit.amplitude,
+                   .residual = std::sqrt(chi_square),
+                   .bell_time = fit.time,
+                   .status = dark ? PixelStatus::too_dark : PixelStatus::ok};
 }
 
 PixelTime time_by_center_of_mass(const PixelWindow& window, const PixelJudge& judge) {
@@ -187,7 +208,7 @@ PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge)
   BellFit fit = fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, window.start);
   const double misfit = std::sqrt(fit.reduced_chi_square());
   double doubt = 0;  // [frames] about a correction
-  if (judge.refuse_misfits && fit.reduced_chi_square() > noise_limit(fit)) {
+  if (judge.refuse_misfits && fit.reduced_chi_square() > noise_limit(fit.samples)) {
     const BellFit second = fit_core(window, fit, judge);
     if (contradicts(second, fit)) {
       // A curved background takes up most of a hump, not all: up to a third of the correction was missing in
@@ -196,7 +217,7 @@ PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge)
       fit = second;
     }
   }
-  const double scale = std::sqrt(std::max(1.0, fit.reduced_chi_square() / noise_limit(fit)));
+  const double scale = std::sqrt(std::max(1.0, fit.reduced_chi_square() / noise_limit(fit.samples)));
   PixelTime result = describe(window, fit.bell, std::hypot(scale * fit.time_sigma(), doubt), misfit, judge);
   if (!fit.converged && result.status == PixelStatus::ok) result.status = PixelStatus::bad_fit;
   return result;

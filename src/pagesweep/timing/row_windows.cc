@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pagesweep/timing/row_windows.h"
+#include "pagesweep/timing/row_windows_internal.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,13 +12,33 @@ RowWindows::RowWindows(const Frames& frames, const StripeProfile& profile, const
       profile_(profile),
       noise_(noise),
       keep_clipped_(keep_clipped),
-      // Beyond the support there is background, which the fit wants to see too.
-      reach_(std::max(-profile.begin(), profile.end()) + 0.25 * profile.full_width_half_maximum() + 1),
-      search_(profile.full_width_half_maximum()) {}
+      reach_(reach_around(profile)),
+      search_(profile.full_width_half_maximum()),
+      rise_sigma_(search_.rise_sigma(noise)) {}
 
-void RowWindows::read(int y) {
-  frames_.read_row(y, samples_);
-  search_.find(samples_, noise_);
+double RowWindows::reach_around(const StripeProfile& profile) {
+  // Beyond the support there is background, which the fit wants to see too.
+  return std::max(-profile.begin(), profile.end()) + 0.25 * profile.full_width_half_maximum() + 1;
+}
+
+void RowWindows::read(int y, int left, int columns) {
+  left_ = left;
+  if (samples_.width() != columns || samples_.height() != frames_.count())
+    samples_ = Image<float>(columns, frames_.count());
+  const bool clipped = frames_.read_row(y, left, samples_);
+  search_.find(samples_, noise_, clipped);
+}
+
+bool RowWindows::copy(int x, int first, std::span<float> gray) const {
+  const float* sample = &samples_(x - left_, first);
+  const int stride = samples_.width();
+  float sum = 0;
+  for (float& value : gray) {
+    value = *sample;
+    sum += value;
+    sample += stride;
+  }
+  return std::isfinite(sum);
 }
 
 PixelWindow RowWindows::window_at(int x, double width, int centre) {
@@ -27,7 +47,7 @@ PixelWindow RowWindows::window_at(int x, double width, int centre) {
   gray_.clear();
   float lowest = std::numeric_limits<float>::infinity();
   for (int i = begin; i < end; ++i) {
-    const float gray = samples_(x, i);
+    const float gray = samples_(x - left_, i);
     lowest = gray < lowest ? gray : lowest;
     const bool is_naive = keep_clipped_ && std::isinf(gray);
     gray_.push_back(is_naive ? static_cast<float>((noise_.sensor().ceiling + 0.5) / noise_.exposure(i)) : gray);

@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pagesweep/timing/stripe_search.h"
+#include "pagesweep/timing/stripe_search_internal.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tuple>
 
 namespace pagesweep {
 namespace {
 
 bool is_dropped(const Image<float>& samples, int i) { return samples.width() > 0 && std::isnan(samples(0, i)); }
-
-/// sums = before + weight * the frame, clipped samples at the ceiling.
-void add_frame(std::span<const float> before, std::span<const float> frame, float weight, float ceiling,
-               std::span<float> sums) {
-  for (std::size_t x = 0; x < frame.size(); ++x) sums[x] = before[x] + weight * std::min(frame[x], ceiling);
-}
 
 }  // namespace
 
@@ -27,13 +20,16 @@ double StripeSearch::rise_sigma(const FrameNoise& noise) const {
   return std::sqrt(1.5 * noise.sensor().read_variance / (box_ * noise.mean_weight()));
 }
 
-void StripeSearch::find(const Image<float>& samples, const FrameNoise& noise) {
+void StripeSearch::find(const Image<float>& samples, const FrameNoise& noise, bool clipped) {
   const auto width = static_cast<std::size_t>(samples.width());
   frame_.assign(width, 0);
   rise_.assign(width, -std::numeric_limits<float>::infinity());
+  // Where exposures take turns, neighbouring frames do not stand for each other.
+  stride_ = noise.mean_weight() < 1 ? 1 : std::max(1, box_ / 4);
   accumulate(samples, noise);
   filter();
-  centre_clipped(samples, noise);
+  look_between(noise);
+  if (clipped) centre_clipped(samples, noise);
 }
 
 void StripeSearch::accumulate(const Image<float>& samples, const FrameNoise& noise) {
@@ -51,31 +47,46 @@ void StripeSearch::accumulate(const Image<float>& samples, const FrameNoise& noi
     if (is_dropped(samples, shown))
       std::ranges::copy(sums_.row(i), sums_.row(i + 1).begin());
     else
-      add_frame(sums_.row(i), samples.row(shown), weight, static_cast<float>(noise.at(shown).ceiling),
-                sums_.row(i + 1));
+      add_weighted(sums_.row(i), samples.row(shown), weight, static_cast<float>(noise.at(shown).ceiling),
+                   sums_.row(i + 1));
   }
 }
 
-void StripeSearch::filter() {
+MeanOfFrames StripeSearch::box_around(int centre) const {
   const int count = sums_.height() - 1, half = box_ / 2;
+  const int begin = std::clamp(centre - half, 0, count), end = std::clamp(centre + half + 1, 0, count);
+  const float weight = weights_[static_cast<std::size_t>(end)] - weights_[static_cast<std::size_t>(begin)];
+  return {sums_.row(begin).data(), sums_.row(end).data(), end > begin ? 1.0F / weight : 0.0F};
+}
+
+/// The box at frame i and, to be taken off, those beside it.
+std::array<MeanOfFrames, 3> StripeSearch::boxes_at(int i) const {
+  std::array<MeanOfFrames, 3> boxes{box_around(i), box_around(i - distance_), box_around(i + distance_)};
   // Beyond the recording's ends a box is cut; where nothing of it is left, the other side's stands for both.
-  const auto mean_of = [&](int centre) {
-    const int begin = std::clamp(centre - half, 0, count), end = std::clamp(centre + half + 1, 0, count);
-    const float weight = weights_[static_cast<std::size_t>(end)] - weights_[static_cast<std::size_t>(begin)];
-    return std::tuple{sums_.row(begin).data(), sums_.row(end).data(), end > begin ? 1.0F / weight : 0.0F};
-  };
-  for (int i = 0; i < count; ++i) {
-    const auto [middle_begin, middle_end, middle] = mean_of(i);
-    auto [left_begin, left_end, left] = mean_of(i - distance_);
-    auto [right_begin, right_end, right] = mean_of(i + distance_);
-    const bool both = left > 0 && right > 0;
-    if (both) left *= 0.5F, right *= 0.5F;
-    for (std::size_t x = 0; x < rise_.size(); ++x) {
-      const float response = middle * (middle_end[x] - middle_begin[x]) - left * (left_end[x] - left_begin[x]) -
-                             right * (right_end[x] - right_begin[x]);
-      const bool higher = response > rise_[x];
-      rise_[x] = higher ? response : rise_[x];
-      frame_[x] = higher ? i : frame_[x];
+  if (boxes[1].factor > 0 && boxes[2].factor > 0) boxes[1].factor *= 0.5F, boxes[2].factor *= 0.5F;
+  return boxes;
+}
+
+void StripeSearch::filter() {
+  for (int i = 0; i + 1 < sums_.height(); i += stride_) {
+    const auto [middle, left, right] = boxes_at(i);
+    keep_highest(middle, left, right, i, rise_, frame_);
+  }
+}
+
+/// Faint bells need the highest response of all frames to rise from the noise.
+void StripeSearch::look_between(const FrameNoise& noise) {
+  const auto sigma = static_cast<float>(rise_sigma(noise));
+  const int last = sums_.height() - 2;
+  for (std::size_t x = 0; x < rise_.size(); ++x) {
+    if (!(rise_[x] > 2.5F * sigma && rise_[x] < 15 * sigma)) continue;
+    const int found = frame_[x];
+    for (int i = std::max(0, found - stride_ / 2); i <= std::min(last, found + stride_ / 2); ++i) {
+      const auto [middle, left, right] = boxes_at(i);
+      const float response = middle.of(x) - left.of(x) - right.of(x);
+      if (!(response > rise_[x])) continue;
+      rise_[x] = response;
+      frame_[x] = i;
     }
   }
 }

@@ -7,7 +7,7 @@
 
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/data/time_map.h"
-#include "pagesweep/timing/row_windows.h"
+#include "pagesweep/timing/row_windows_internal.h"
 
 namespace pagesweep {
 namespace {
@@ -84,16 +84,28 @@ void fill(Image<float>& tiles) {
 }  // namespace
 
 double StripeWidths::at(int x, int y) const {
-  if (log_width_.empty()) return 1;
-  const auto place = [this](int pixel, int tiles) {
-    return std::clamp((pixel + 0.5) / tile_px_ - 0.5, 0.0, static_cast<double>(tiles - 1));
+  float log_width = 0;
+  log_row(y, x, {&log_width, 1});
+  return std::exp(log_width);
+}
+
+void StripeWidths::log_row(int y, int left, std::span<float> log_widths) const {
+  std::ranges::fill(log_widths, 0.0F);
+  if (log_width_.empty()) return;
+  const float per_tile = 1.0F / static_cast<float>(tile_px_);
+  const auto place = [&](int pixel, int tiles) {
+    return std::clamp((static_cast<float>(pixel) + 0.5F) * per_tile - 0.5F, 0.0F, static_cast<float>(tiles - 1));
   };
-  const double u = place(x, log_width_.width()), v = place(y, log_width_.height());
-  const int i = static_cast<int>(u), j = static_cast<int>(v);
-  const int right = std::min(i + 1, log_width_.width() - 1), below = std::min(j + 1, log_width_.height() - 1);
-  const double top = log_width_(i, j) + (u - i) * (log_width_(right, j) - log_width_(i, j));
-  const double bottom = log_width_(i, below) + (u - i) * (log_width_(right, below) - log_width_(i, below));
-  return std::exp(top + (v - j) * (bottom - top));
+  const float v = place(y, log_width_.height());
+  const int above = static_cast<int>(v), below = std::min(above + 1, log_width_.height() - 1);
+  const auto top = log_width_.row(above), bottom = log_width_.row(below);
+  for (std::size_t k = 0; k < log_widths.size(); ++k) {
+    const float u = place(left + static_cast<int>(k), log_width_.width());
+    const auto i = static_cast<std::size_t>(u), right = std::min(i + 1, top.size() - 1);
+    const float upper = top[i] + (u - static_cast<float>(i)) * (top[right] - top[i]);
+    const float lower = bottom[i] + (u - static_cast<float>(i)) * (bottom[right] - bottom[i]);
+    log_widths[k] = upper + (v - static_cast<float>(above)) * (lower - upper);
+  }
 }
 
 std::pair<double, double> StripeWidths::range() const {

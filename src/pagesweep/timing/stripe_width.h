@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <utility>
 
 #include "pagesweep/base/image.h"
@@ -20,6 +21,8 @@ class StripeWidths {
 
   /// Relative width at a pixel, bilinear between the tiles' middles; 1 if nothing is known.
   double at(int x, int y) const;
+  /// The logarithms of the relative widths of pixels (left, y), (left + 1, y), ...
+  void log_row(int y, int left, std::span<float> log_widths) const;
   /// Of the tiles, lowest and highest.
   std::pair<double, double> range() const;
 

@@ -9,9 +9,7 @@
 
 #include "pagesweep/base/local_plane.h"
 #include "pagesweep/base/parallel.h"
-#include "pagesweep/camera/ray_table.h"
 #include "pagesweep/triangulation/light_section.h"
-#include "pagesweep/triangulation/normals.h"
 
 namespace pagesweep {
 namespace {
@@ -139,15 +137,15 @@ bool may_be_sectioned(PixelStatus status) {
 
 class Fusion {
  public:
-  Fusion(const PointMap& points, const Correspondences& matches, const TimeMap& times, const Camera& camera,
+  Fusion(const PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
          const Camera& to, const Light& light, const TriangulationOptions& options)
       : matches_(matches),
         times_(times),
-        camera_(camera),
+        rays_(camera),
+        camera_(camera.camera()),
         to_(to),
         light_(light),
         options_(options),
-        rays_(camera),
         lateness_(points, times, light) {}
 
   void put(PointMap& points, int x, int y, Neighbourhood& around, FusionCounts& counts) const {
@@ -169,8 +167,6 @@ class Fusion {
     ++counts.added;
     set(points, x, y, ray, sheet);
   }
-
-  const RayTable& rays() const { return rays_; }
 
  private:
   /// At a step in depth a pixel's time may be that of neither surface.
@@ -217,11 +213,11 @@ class Fusion {
 
   const Correspondences& matches_;
   const TimeMap& times_;
+  const RayTable& rays_;
   const Camera& camera_;
   const Camera& to_;
   const Light& light_;
   const TriangulationOptions& options_;
-  const RayTable rays_;
   const Lateness lateness_;
   const Eigen::Vector3d center_ = camera_.center();
   const Eigen::Matrix3d rig_from_cam_ = camera_.cam_from_rig.rotation.transpose();
@@ -229,19 +225,18 @@ class Fusion {
 
 }  // namespace
 
-FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const TimeMap& times, const Camera& camera,
-                        const Camera& to, const Light& light, const TriangulationOptions& options) {
-  const auto fits = [&](int width, int height) { return width == camera.width && height == camera.height; };
+FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
+                        const RayTable& to, const Light& light, const TriangulationOptions& options) {
+  const auto fits = [&](int width, int height) { return width == camera.width() && height == camera.height(); };
   if (!fits(points.width(), points.height()) || !fits(matches.width(), matches.height()) ||
       !fits(times.width(), times.height()))
     throw std::invalid_argument("fuse_light: points, matches or times are not of the camera's size");
-  const Fusion fusion(points, matches, times, camera, to, light, options);
-  std::vector<FusionCounts> rows(static_cast<std::size_t>(camera.height));
-  parallel_rows(camera.height, [&](int y) {
+  const Fusion fusion(points, matches, times, camera, to.camera(), light, options);
+  std::vector<FusionCounts> rows(static_cast<std::size_t>(camera.height()));
+  parallel_rows(camera.height(), [&](int y) {
     Neighbourhood around;
-    for (int x = 0; x < camera.width; ++x) fusion.put(points, x, y, around, rows[static_cast<std::size_t>(y)]);
+    for (int x = 0; x < camera.width(); ++x) fusion.put(points, x, y, around, rows[static_cast<std::size_t>(y)]);
   });
-  fit_normals(points, camera, fusion.rays(), options.normal_radius_px);
   FusionCounts all;
   for (const FusionCounts& row : rows) {
     all.weighted += row.weighted;

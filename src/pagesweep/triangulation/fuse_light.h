@@ -3,7 +3,6 @@
 
 #include <cstdint>
 
-#include "pagesweep/camera/camera.h"
 #include "pagesweep/camera/light.h"
 #include "pagesweep/data/correspondences.h"
 #include "pagesweep/data/point_map.h"
@@ -26,11 +25,11 @@ struct FusionCounts {
 /// surface by the same in a neighbourhood of 8 pixels, it follows: light from a facing page delays both cameras
 /// alike, and the match is right. A match that the sheet contradicts by more than six standard deviations lies on a
 /// step in depth: the pixel's own time and the sheet replace it, or it becomes off_surface where they know too little.
-/// See docs/derivations/fusion.md.
+/// See docs/derivations/fusion.md. Normals are left to fit_normals().
 /// \param points   of `camera`, from triangulate() with these `matches` and `times`; changed
 /// \param to       the camera that the matches are in
 /// \throws std::invalid_argument  if sizes differ
-FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const TimeMap& times, const Camera& camera,
-                        const Camera& to, const Light& light, const TriangulationOptions& options = {});
+FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
+                        const RayTable& to, const Light& light, const TriangulationOptions& options = {});
 
 }  // namespace pagesweep

@@ -47,9 +47,9 @@ void reject(PointMap& points, int x, int y) {
 
 }  // namespace
 
-void fit_normals(PointMap& points, const Camera& camera, const RayTable& rays, int radius_px) {
-  const Image<float> inverse_depth = inverse_depths(points, camera);
-  const Eigen::Matrix3f rig_from_cam = camera.cam_from_rig.rotation.transpose().cast<float>();
+void fit_normals(PointMap& points, const RayTable& camera, int radius_px) {
+  const Image<float> inverse_depth = inverse_depths(points, camera.camera());
+  const Eigen::Matrix3f rig_from_cam = camera.camera().cam_from_rig.rotation.transpose().cast<float>();
   parallel_rows(points.height(), [&](int y) {
     Neighbourhood around;
     for (int x = 0; x < points.width(); ++x) {
@@ -70,7 +70,7 @@ void fit_normals(PointMap& points, const Camera& camera, const RayTable& rays, i
         continue;
       }
       const LocalPlane relative{plane->across / here, plane->down / here, plane->middle / here};
-      const Eigen::Vector3f normal = rig_from_cam * normal_of(relative, rays, x, y);
+      const Eigen::Vector3f normal = rig_from_cam * normal_of(relative, camera, x, y);
       points.nx(x, y) = normal.x();
       points.ny(x, y) = normal.y();
       points.nz(x, y) = normal.z();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "pagesweep/camera/camera.h"
 #include "pagesweep/camera/ray_table.h"
 #include "pagesweep/data/point_map.h"
 
@@ -15,6 +14,6 @@ namespace pagesweep {
 /// more than three times the median do not count in a second fit: another surface behind an edge. A point is off the
 /// surface if fewer than six neighbours have points, or if it misses the plane by more than six of its own standard
 /// deviations and six times the median.
-void fit_normals(PointMap& points, const Camera& camera, const RayTable& rays, int radius_px);
+void fit_normals(PointMap& points, const RayTable& camera, int radius_px = 3);
 
 }  // namespace pagesweep

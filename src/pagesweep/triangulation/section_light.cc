@@ -6,16 +6,14 @@
 #include <stdexcept>
 
 #include "pagesweep/base/parallel.h"
-#include "pagesweep/camera/ray_table.h"
 #include "pagesweep/triangulation/light_section.h"
-#include "pagesweep/triangulation/normals.h"
 
 namespace pagesweep {
-PointMap section_light(const TimeMap& times, const Camera& camera, const Light& light,
+PointMap section_light(const TimeMap& times, const RayTable& rays, const Light& light,
                        const TriangulationOptions& options) {
+  const Camera& camera = rays.camera();
   if (times.width() != camera.width || times.height() != camera.height)
     throw std::invalid_argument("section_light: the time map is not of the camera's size");
-  const RayTable rays(camera);
   const Eigen::Vector3d center = camera.center();
   const Eigen::Matrix3d rig_from_cam = camera.cam_from_rig.rotation.transpose();
   PointMap points(camera.width, camera.height);
@@ -44,7 +42,6 @@ PointMap section_light(const TimeMap& times, const Camera& camera, const Light& 
       points.sigma(x, y) = static_cast<float>(times.sigma(x, y) * std::abs(met.mm_per_frame));
     }
   });
-  fit_normals(points, camera, rays, options.normal_radius_px);
   return points;
 }
 

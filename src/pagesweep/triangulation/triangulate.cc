@@ -7,8 +7,6 @@
 #include <stdexcept>
 
 #include "pagesweep/base/parallel.h"
-#include "pagesweep/camera/ray_table.h"
-#include "pagesweep/triangulation/normals.h"
 
 namespace pagesweep {
 namespace {
@@ -40,8 +38,8 @@ Ray ray_towards(const Camera& camera, const Eigen::Vector3d& center, const Eigen
 /// What is needed to triangulate one pixel after the other.
 class Triangulator {
  public:
-  Triangulator(const Camera& from, const RayTable& from_rays, const Camera& to, const TriangulationOptions& options)
-      : from_(from), to_(to), from_rays_(from_rays), to_rays_(to), options_(options) {}
+  Triangulator(const RayTable& from, const RayTable& to, const TriangulationOptions& options)
+      : from_(from.camera()), to_(to.camera()), from_rays_(from), to_rays_(to), options_(options) {}
 
   void put(const Correspondences& matches, int x, int y, PointMap& points) const {
     const auto fail = [&](PixelStatus why) { points.status(x, y) = why; };
@@ -72,7 +70,7 @@ class Triangulator {
   const Camera& from_;
   const Camera& to_;
   const RayTable& from_rays_;
-  const RayTable to_rays_;
+  const RayTable& to_rays_;
   const TriangulationOptions& options_;
   const Eigen::Vector3d from_center_ = from_.center();
   const Eigen::Vector3d to_center_ = to_.center();
@@ -80,21 +78,19 @@ class Triangulator {
 
 }  // namespace
 
-PointMap triangulate(const Correspondences& matches, const Image<float>& intensity, const Camera& from,
-                     const Camera& to, const TriangulationOptions& options) {
-  const auto fits = [&](int width, int height) { return width == from.width && height == from.height; };
+PointMap triangulate(const Correspondences& matches, const Image<float>& intensity, const RayTable& from,
+                     const RayTable& to, const TriangulationOptions& options) {
+  const auto fits = [&](int width, int height) { return width == from.width() && height == from.height(); };
   if (!fits(matches.width(), matches.height()))
     throw std::invalid_argument("triangulate: the matches are not of the camera's size");
   if (!intensity.empty() && !fits(intensity.width(), intensity.height()))
     throw std::invalid_argument("triangulate: the intensity is not of the camera's size");
-  const RayTable from_rays(from);
-  const Triangulator triangulator(from, from_rays, to, options);
-  PointMap points(from.width, from.height);
+  const Triangulator triangulator(from, to, options);
+  PointMap points(from.width(), from.height());
   if (!intensity.empty()) points.intensity = intensity;
-  parallel_rows(from.height, [&](int y) {
-    for (int x = 0; x < from.width; ++x) triangulator.put(matches, x, y, points);
+  parallel_rows(from.height(), [&](int y) {
+    for (int x = 0; x < from.width(); ++x) triangulator.put(matches, x, y, points);
   });
-  fit_normals(points, from, from_rays, options.normal_radius_px);
   return points;
 }
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "pagesweep/base/image.h"
-#include "pagesweep/camera/camera.h"
+#include "pagesweep/camera/ray_table.h"
 #include "pagesweep/data/correspondences.h"
 #include "pagesweep/data/point_map.h"
 
@@ -27,12 +27,12 @@ struct TriangulationOptions {
 /// Intersects the viewing rays of corresponding pixels.
 ///
 /// A pixel's point lies on its own viewing ray, where the other camera's ray passes nearest. sigma is the match's sigma
-/// over the speed [px/mm] at which the point's picture moves in the other camera when it slides along the ray. Normals
-/// are those of planes fitted to the neighbouring points. A pixel without a match keeps its status.
+/// over the speed [px/mm] at which the point's picture moves in the other camera when it slides along the ray. A pixel
+/// without a match keeps its status. Normals are left to fit_normals().
 /// \param matches    for each pixel of `from`, the place in `to`
 /// \param intensity  copied to the points; of `from`'s size, or empty
 /// \throws std::invalid_argument  if matches or intensity are not of `from`'s size
-PointMap triangulate(const Correspondences& matches, const Image<float>& intensity, const Camera& from,
-                     const Camera& to, const TriangulationOptions& options = {});
+PointMap triangulate(const Correspondences& matches, const Image<float>& intensity, const RayTable& from,
+                     const RayTable& to, const TriangulationOptions& options = {});
 
 }  // namespace pagesweep

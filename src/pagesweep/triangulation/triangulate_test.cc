@@ -8,6 +8,7 @@
 #include <random>
 
 #include "pagesweep/sim/analytic_scene.h"
+#include "pagesweep/triangulation/normals.h"
 
 namespace pagesweep {
 namespace {
@@ -87,7 +88,8 @@ TEST_F(Triangulate, SigmaIsTheSpreadAlongTheViewingRay) {
 TEST_F(Triangulate, NormalsAreTheSurfaces) {
   for (const AnalyticScene* scene : {&tilted, &cylinder}) {
     const PointMap truth = scene->points(cam1);
-    const PointMap points = triangulate(scene->correspondences(cam1, cam2), {}, cam1, cam2);
+    PointMap points = triangulate(scene->correspondences(cam1, cam2), {}, cam1, cam2);
+    fit_normals(points, cam1);
     for (int y = 5; y < points.height() - 5; ++y)
       for (int x = 5; x < points.width() - 5; ++x) {
         if (points.status(x, y) != PixelStatus::ok) continue;
@@ -98,7 +100,8 @@ TEST_F(Triangulate, NormalsAreTheSurfaces) {
 }
 
 TEST_F(Triangulate, NormalsBesideAnEdgeAreThoseOfTheirOwnSurface) {
-  const PointMap points = triangulate(step.correspondences(cam1, cam2), {}, cam1, cam2);
+  PointMap points = triangulate(step.correspondences(cam1, cam2), {}, cam1, cam2);
+  fit_normals(points, cam1);
   int upright = 0, count = 0;
   for (int y = 0; y < points.height(); ++y)
     for (int x = 0; x < points.width(); ++x) {
@@ -113,7 +116,8 @@ TEST_F(Triangulate, APointFarOffItsNeighboursIsOffTheSurface) {
   Correspondences matches = tilted.correspondences(cam1, cam2);
   matches.v(80, 80) += 3;  // 30 standard deviations
   matches.sigma.pixels()[0] = 0.1f;
-  const PointMap points = triangulate(matches, {}, cam1, cam2);
+  PointMap points = triangulate(matches, {}, cam1, cam2);
+  fit_normals(points, cam1);
   EXPECT_EQ(points.status(80, 80), PixelStatus::off_surface);
   EXPECT_TRUE(std::isnan(points.x(80, 80)));
   EXPECT_EQ(points.status(81, 80), PixelStatus::ok);

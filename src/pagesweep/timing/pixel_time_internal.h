@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+
 #include "pagesweep/data/status.h"
-#include "pagesweep/timing/row_windows.h"
+#include "pagesweep/timing/plain_bells_internal.h"
+#include "pagesweep/timing/row_windows_internal.h"
 
 namespace pagesweep {
 
@@ -38,6 +41,10 @@ PixelTime time_by_shift(const PixelWindow& window, const PixelJudge& judge);
 /// second opinion, and replaces the first where the two contradict each other (Hausman 1978: an efficient estimate is
 /// doubted when a robust one differs by more than the difference of their variances allows).
 PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge);
+
+/// What time_by_likelihood() says of a bell that was fitted as a plain one; nothing if it is not one, because its
+/// residuals are more than noise.
+std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double width, const PixelJudge& judge);
 
 /// What the samples say about a bell, whichever estimator found it: ok, or too_dark, truncated, saturated, bad_fit.
 /// A bell that five standard deviations of noise could have made is too dark, and so is one whose time is too

@@ -6,7 +6,7 @@
 
 #include "pagesweep/data/frames.h"
 #include "pagesweep/timing/bell_fit.h"
-#include "pagesweep/timing/stripe_search.h"
+#include "pagesweep/timing/stripe_search_internal.h"
 
 namespace pagesweep {
 
@@ -23,13 +23,20 @@ class RowWindows {
   /// \param keep_clipped  clipped samples stay in as if the saturation level had been measured (the naive way)
   RowWindows(const Frames& frames, const StripeProfile& profile, const FrameNoise& noise, bool keep_clipped = false);
 
-  void read(int y);
+  void read(int y) { read(y, 0, frames_.width()); }
+  /// Only the pixels from column `left` on; others must then not be asked for.
+  void read(int y, int left, int columns);
   /// How many standard deviations the stripe search's response lies above what noise alone would give.
-  double significance(int x) const { return search_.rise(x) / search_.rise_sigma(noise_); }
+  double significance(int x) const { return search_.rise(x - left_) / rise_sigma_; }
   /// \param width  of the stripe there, relative to the profile's
-  PixelWindow window(int x, double width) { return window_at(x, width, search_.frame(x)); }
+  PixelWindow window(int x, double width) { return window_at(x, width, frame(x)); }
   PixelWindow window_at(int x, double width, int centre);
+  /// [frames] to both sides of the stripe's middle, at width 1, that a window has.
+  static double reach_around(const StripeProfile& profile);
+  int frame(int x) const { return search_.frame(x - left_); }  ///< nearest to the stripe's middle
   int frame_count() const { return frames_.count(); }
+  /// The samples of frames first, first + 1, ... of a pixel. \return whether all are there and none is clipped
+  bool copy(int x, int first, std::span<float> gray) const;
 
  private:
   double start_amplitude(const PixelWindow& window, double width) const;
@@ -38,8 +45,10 @@ class RowWindows {
   const StripeProfile& profile_;
   const FrameNoise& noise_;
   const bool keep_clipped_;
-  double reach_;  ///< [frames] to both sides of the stripe's middle, at width 1
+  const double reach_;
   StripeSearch search_;
+  double rise_sigma_;
+  int left_ = 0;  ///< column of samples_(0, i)
   Image<float> samples_;
   std::vector<float> gray_;
 };

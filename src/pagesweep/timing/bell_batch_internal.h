@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+#include "pagesweep/timing/bell_tables_internal.h"
+
+namespace pagesweep {
+
+inline constexpr int most_bells = 16;  ///< at once; the longest vector
+
+/// Bells of some pixels while they are fitted, one entry a pixel. Times are relative to the pixel's middle frame.
+struct BellBatch {
+  template <class T>
+  using Each = std::array<T, most_bells>;
+
+  int count = 0;
+  int middle = 0;          ///< entry of gray[i] that is of the middle frame
+  float most_moved = 0;    ///< [frames] from there: farther away samples are missing
+  float near = 0;          ///< [frames] from the true time: small against the stripe's width
+  float longest_step = 0;  ///< [frames]
+  float read_variance = 1, gain = 0;
+
+  Each<const BellTable*> table{};
+  Each<float> width_rest{};  ///< log width beyond the table's
+  Each<const float*> gray{};
+
+  alignas(64) Each<float> time{}, amplitude{}, background{}, sigma{}, chi_square{};
+  Each<bool> good{};
+};
+
+/// Least squares steps with even weights until all good bells are near; what goes astray is good no longer.
+void approach(BellBatch& batch);
+
+/// Gauss-Newton steps with every sample weighted by the noise expected there, until they are small against sigma.
+void refine(BellBatch& batch);
+
+}  // namespace pagesweep

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "pagesweep/timing/stripe_profile.h"
+
+namespace pagesweep {
+
+/// A stripe of one width as whole frames sample it, at all sub-frame phases, and the weights by which samples of even
+/// noise tell amplitude, background and time.
+///
+/// Row q of a table is for a bell whose middle lies phase_of(q) after a whole frame; its entry k is for the sample
+/// k - reach frames from that frame, and 0 from 2 reach + 1 on. Tables have `phases + 1` rows of `length` entries.
+struct BellTable {
+  static constexpr int phases = 32;  ///< a frame
+  static double phase_of(int row) { return static_cast<double>(row) / phases - 0.5; }
+
+  float log_width = 0;                                                   ///< relative to the profile
+  int reach = 0;                                                         ///< [frames] to both sides
+  int length = 0;                                                        ///< 2 reach + 1, rounded up to whole vectors
+  std::vector<float> value, slope;                                       ///< of the profile; slope by frames
+  std::vector<float> amplitude_weight, background_weight, slope_weight;  ///< least squares solution
+  std::vector<float> inside;                                             ///< [length] 1 for samples within reach
+};
+
+/// Tables for all stripe widths of a camera, a percent apart. What lies between two rows is reached by the slope:
+/// an error below 1e-4 of the amplitude.
+class BellTables {
+ public:
+  /// \param reach   [frames] to both sides of the middle at width 1: how much of a pixel's samples is to be used
+  /// \param widths  narrowest and widest stripe, relative to the profile
+  BellTables(const StripeProfile& profile, double reach, std::pair<double, double> widths);
+
+  /// The nearest one.
+  const BellTable& at(double log_width) const;
+  int longest_reach() const { return tables_.back().reach; }
+  int longest() const { return tables_.back().length; }
+
+ private:
+  double first_log_width_;
+  std::vector<BellTable> tables_;
+};
+
+}  // namespace pagesweep

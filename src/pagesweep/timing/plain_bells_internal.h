@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "pagesweep/timing/bell_batch_internal.h"
+#include "pagesweep/timing/bell_tables_internal.h"
+#include "pagesweep/timing/sensor_noise.h"
+
+namespace pagesweep {
+
+/// Fits bells to the samples of some pixels at once: the estimate of fit_bell() for the plain case, in which all
+/// samples around the bell were recorded and none is clipped. That is nearly every pixel, so it is what speed depends
+/// on.
+///
+/// Two or three least squares steps with even weights, which with a known profile are dot products with tabulated
+/// weights, bring the bell within a small part of the stripe's width; then Gauss-Newton steps weight every sample with
+/// the noise that the model lets expect there. Sums run along time; the equations of all pixels are solved side by
+/// side. One a thread.
+class PlainBells {
+ public:
+  struct Fit {
+    bool converged = false;  ///< if not, the pixel is not a plain case, and nothing else here holds
+    double time = 0;         ///< [frames]
+    double amplitude = 0;    ///< [gray values]
+    double background = 0;   ///< [gray values]
+    double time_sigma = 0;   ///< [frames] from the noise alone
+    double chi_square = 0;   ///< of all samples
+    int samples = 0;
+  };
+
+  /// \param tables  must outlive this
+  /// \param fwhm    of the stripe [frames]
+  PlainBells(const BellTables& tables, const SensorNoise& noise, double fwhm);
+
+  /// How many samples before and after the expected middle frame are wanted.
+  int reach() const { return batch_.middle; }
+
+  void clear() { batch_.count = 0; }
+  bool is_full() const { return batch_.count == most_bells; }
+  /// Makes room for another pixel. \return where its samples at frames centre - reach() ... centre + reach() go
+  float* add(int centre, double log_width);
+  void drop_last() { --batch_.count; }
+  void fit();
+  Fit operator[](int i) const;
+
+ private:
+  const BellTables& tables_;
+  BellBatch batch_;
+  BellBatch::Each<int> centre_{};
+  std::size_t row_length_;
+  std::vector<float> gray_;  ///< `most_bells` rows; what follows the samples is 0
+};
+
+}  // namespace pagesweep
