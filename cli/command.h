@@ -32,6 +32,7 @@ void add_simulate_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_plan_command(CLI::App& app);
 void add_acceptance_command(CLI::App& app);
+void add_convert_command(CLI::App& app);
 void add_info_command(CLI::App& app);
 
 }  // namespace pagesweep::cli
