@@ -53,7 +53,7 @@ tidy: setup tools  ## run clang-tidy on every file
 
 .PHONY: format
 format: tools  ## format every source file
-	find src cli tests samples -name '*.h' -o -name '*.cc' | xargs clang-format-19 -i
+	find src cli bench tests samples -name '*.h' -o -name '*.cc' | xargs clang-format-19 -i
 
 .PHONY: results
 results: build  ## measure every figure of docs/results.md; table and build/results/results.json
@@ -61,9 +61,10 @@ results: build  ## measure every figure of docs/results.md; table and build/resu
 	scripts/results
 
 .PHONY: bench
-bench: setup  ## build and run the benchmarks of every directory
+bench: setup  ## measure how long everything takes; table and build/bench/results.json
+	scripts/install-dependencies --bench
 	$(call build_preset,bench)
-	find build/bench -name '*_bench' -type f -executable | sort | while read -r bench; do "$$bench" || exit 1; done
+	scripts/bench
 
 .PHONY: docs
 docs: build  ## write docs/options.md anew from the program's own help

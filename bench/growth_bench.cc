@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the time grows with what there is to do: exponents of pixels, frames and depth range.
+#include <array>
+
+#include "bench/comparison.h"
+#include "bench/synthetic_sweep.h"
+#include "pagesweep/camera/ray_table.h"
+#include "pagesweep/matching/match_sequences.h"
+#include "pagesweep/timing/estimate_times.h"
+#include "pagesweep/triangulation/triangulate.h"
+
+namespace pagesweep::bench {
+namespace {
+
+constexpr double most_exponent = 1.05;  ///< the goal: no worse than what there is to do
+constexpr double table_mm = 640;        ///< from the cameras, about
+
+/// Adds the exponent of one kind of work over one kind of size.
+void measure(const std::string& what, const std::array<double, 4>& sizes, const std::array<Way, 4>& ways,
+             const Settings& settings, Report& report) {
+  const auto seconds = interleave(settings.rounds, ways);
+  report.add({what + ", the largest", "s", seconds.back()});
+  report.add({what + ": exponent", "", exponents(sizes, seconds), most_exponent});
+}
+
+std::vector<RayTable> rays_of(const SyntheticScene& scene) {
+  return {scene.rig.cameras.begin(), scene.rig.cameras.end()};
+}
+
+double pixels_of(int side_px) { return 2.0 * side_px * side_px; }
+
+void grow_pixels(const Settings& settings, Report& report) {
+  constexpr std::array<int, 4> sides = {256, 416, 640, 1024};
+  std::array<double, 4> pixels{};
+  std::array<Way, 4> times, points, sequences;
+  std::vector<SyntheticScene> scenes;
+  std::vector<SyntheticFrames> sweeps;
+  std::vector<std::vector<Frames>> waves;
+  std::vector<Timing> timings;
+  std::vector<std::vector<RayTable>> rays;
+  for (const int side : sides) {
+    scenes.push_back(make_scene(side));
+    rays.push_back(rays_of(scenes.back()));
+    sweeps.push_back(sweep_over(scenes.back(), {.count = 100}));
+    timings.push_back(estimate_times(sweeps.back().frames));
+    waves.push_back(project_waves(scenes.back(), 12));
+  }
+  // The same depths for all sizes: found automatically, they would be those of what a larger picture sees besides.
+  const MatchOptions depths{.near_mm = table_mm - 100, .far_mm = table_mm + 100};
+  for (std::size_t k = 0; k < sides.size(); ++k) {
+    pixels[k] = pixels_of(sides[k]);
+    times[k].run = [&, k] { estimate_times(sweeps[k].frames); };
+    points[k].run = [&, k] {
+      const auto& maps = timings[k].maps;
+      const MatchPair matches = match_times(maps[0], maps[1], rays[k][0], rays[k][1], depths);
+      triangulate(matches.from_first, maps[0].amplitude, rays[k][0], rays[k][1]);
+      triangulate(matches.from_second, maps[1].amplitude, rays[k][1], rays[k][0]);
+    };
+    sequences[k].run = [&, k] { match_sequences(waves[k][0], waves[k][1], rays[k][0], rays[k][1], depths); };
+  }
+  measure("time values over pixels", pixels, times, settings, report);
+  measure("time matching and triangulation over pixels", pixels, points, settings, report);
+  measure("sequence matching over pixels", pixels, sequences, settings, report);
+}
+
+void grow_frames(const Settings& settings, Report& report) {
+  constexpr std::array<double, 4> for_times = {50, 100, 200, 400}, for_sequences = {12, 24, 48, 96};
+  std::array<Way, 4> times, sequences;
+  const SyntheticScene scene = make_scene(512), small_scene = make_scene(256);
+  const std::vector<RayTable> small_rays = rays_of(small_scene);
+  std::vector<SyntheticFrames> sweeps;
+  std::vector<std::vector<Frames>> waves;
+  const MatchOptions depths{.near_mm = table_mm - 50, .far_mm = table_mm + 50};
+  for (std::size_t k = 0; k < 4; ++k) {
+    sweeps.push_back(sweep_over(scene, {.count = static_cast<int>(for_times[k])}));
+    waves.push_back(project_waves(small_scene, static_cast<int>(for_sequences[k])));
+    times[k].run = [&, k] { estimate_times(sweeps[k].frames); };
+    sequences[k].run = [&, k] {
+      match_sequences(waves[k][0], waves[k][1], small_scene.rig.cameras[0], small_scene.rig.cameras[1], depths);
+    };
+  }
+  measure("time values over frames", for_times, times, settings, report);
+  measure("sequence matching over frames", for_sequences, sequences, settings, report);
+}
+
+void grow_depths(const Settings& settings, Report& report) {
+  constexpr std::array<double, 4> ranges_mm = {50, 100, 200, 400};
+  std::array<Way, 4> times, sequences;
+  const SyntheticScene scene = make_scene(1024), small_scene = make_scene(384);
+  const std::vector<RayTable> rays = rays_of(scene), small_rays = rays_of(small_scene);
+  const SyntheticFrames sweep = sweep_over(scene, {.count = 100});
+  const Timing timing = estimate_times(sweep.frames);
+  const std::vector<Frames> waves = project_waves(small_scene, 12);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const MatchOptions depths{.near_mm = table_mm - ranges_mm[k] / 2, .far_mm = table_mm + ranges_mm[k] / 2};
+    times[k].run = [&, depths] {
+      match_times(timing.maps[0], timing.maps[1], scene.rig.cameras[0], scene.rig.cameras[1], depths);
+    };
+    sequences[k].run = [&, depths] {
+      match_sequences(waves[0], waves[1], small_scene.rig.cameras[0], small_scene.rig.cameras[1], depths);
+    };
+  }
+  measure("time matching over the depth range", ranges_mm, times, settings, report);
+  measure("sequence matching over the depth range", ranges_mm, sequences, settings, report);
+}
+
+}  // namespace
+
+void measure_growth(const Settings& settings, Report& report) {
+  report.title("Growth");
+  grow_pixels(settings, report);
+  grow_frames(settings, report);
+  grow_depths(settings, report);
+}
+
+}  // namespace pagesweep::bench
