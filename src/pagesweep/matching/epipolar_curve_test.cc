@@ -18,7 +18,7 @@ class EpipolarCurves : public testing::Test {
   const Camera& cam1 = rig.cameras[0];
   const Camera& cam2 = rig.cameras[1];
   const RayTable rays1{cam1}, rays2{cam2};
-  const EpipolarGeometry geometry{cam1, rays1, cam2, rays2, {1 / 2000.0, 1 / 200.0}};
+  const EpipolarGeometry geometry{rays1, rays2, {1 / 2000.0, 1 / 200.0}};
 
   /// The point of a pixel's viewing ray at an inverse depth.
   Eigen::Vector3d point(int x, int y, double w) const {
@@ -85,7 +85,7 @@ TEST_F(EpipolarCurves, AreEmptyWhereTheOtherCameraLooksAway) {
   away.cam_from_rig.rotation = Eigen::AngleAxisd(3, Eigen::Vector3d::UnitX()) * away.cam_from_rig.rotation;
   away.cam_from_rig.translation = -away.cam_from_rig.rotation * center;
   const RayTable rays(away);
-  const EpipolarGeometry backwards(cam1, rays1, away, rays, {1 / 2000.0, 1 / 200.0});
+  const EpipolarGeometry backwards(rays1, rays, {1 / 2000.0, 1 / 200.0});
   EXPECT_TRUE(backwards.curve(100, 100).range().empty());
 }
 

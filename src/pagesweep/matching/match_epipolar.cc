@@ -64,18 +64,23 @@ std::optional<double> solve(const TimeDifference& difference, Bracket b, double 
 /// Root near the left neighbour's depth: steps downhill from there until the sign changes.
 std::optional<double> follow(const TimeDifference& difference, double expected, double step) {
   constexpr double reach_px = 6;
-  const double here = difference(expected);
+  double w = expected, here = difference(expected), ahead = difference(expected + step);
   if (here == 0) return expected;
-  const double ahead = difference(expected + step);
-  const double slope = ahead - here;
-  if (!std::isfinite(slope) || slope == 0) return std::nullopt;
-  const double distance = -here / slope;  // [px] as the neighbourhood predicts
-  if (!(std::abs(distance) < reach_px)) return std::nullopt;
-  if (distance > 0 && distance <= 1) return solve(difference, {expected, expected + step, here, ahead}, step);
-  const double far_end = expected + (distance + std::copysign(0.3, distance)) * step;
-  const double at_far_end = difference(far_end);
-  if (!(here * at_far_end < 0)) return std::nullopt;
-  return solve(difference, {expected, far_end, here, at_far_end}, step);
+  if (!((here > 0) == (ahead > 0))) return solve(difference, {expected, expected + step, here, ahead}, step);
+  double slope = ahead - here;  // [frames/px]
+  for (int tries = 0; tries < 4; ++tries) {
+    const double distance = -here / slope;  // [px] as the neighbourhood predicts
+    const double next = w + (distance + std::copysign(0.3, distance)) * step;
+    if (!(std::abs(next - expected) < reach_px * step)) return std::nullopt;  // NaN, too
+    const double there = difference(next);
+    if (std::isnan(there)) return std::nullopt;
+    if ((there > 0) != (here > 0)) return solve(difference, {w, next, here, there}, step);
+    if (!(std::abs(there) < std::abs(here))) return std::nullopt;  // no way down here
+    slope = (there - here) * step / (next - w);
+    w = next;
+    here = there;
+  }
+  return std::nullopt;
 }
 
 /// Median amplitude of a camera's pixels; 1 if there are none.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/matching/agreement.h"
@@ -43,11 +44,16 @@ InverseDepthRange allowed_range(const Camera& first, const Camera& second, const
   return {options.far_mm > 0 ? 1 / options.far_mm : 0, options.near_mm > 0 ? 1 / options.near_mm : 10 / baseline};
 }
 
+/// Depths in one camera and in the other.
+struct DepthRanges {
+  InverseDepthRange there, back;
+};
+
 /// Inverse depths of a grid of pixels, kept if the matched pixel's own match leads back.
-std::vector<double> probe_depths(const Direction& there, const Direction& back, InverseDepthRange range) {
-  const EpipolarGeometry geometry = there.geometry(range), return_geometry = back.geometry(range);
+std::vector<double> probe_depths(const Direction& there, const Direction& back, const DepthRanges& ranges, int probes) {
+  const EpipolarGeometry geometry = there.geometry(ranges.there), return_geometry = back.geometry(ranges.back);
   const int width = there.from->width(), height = there.from->height();
-  const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / 20000.0)));
+  const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / probes)));
   std::vector<std::vector<double>> rows(static_cast<std::size_t>((height + stride - 1) / stride));
   parallel_rows(static_cast<int>(rows.size()), [&](int row) {
     const auto finder = there.matcher->make_finder(), return_finder = back.matcher->make_finder();
@@ -67,16 +73,28 @@ std::vector<double> probe_depths(const Direction& there, const Direction& back, 
   return depths;
 }
 
-/// The depths that the scene shows: all but a thousandth at either end, and a fifth more. A range that is too wide
-/// costs time and a few more ambiguous pixels; one that is too narrow costs the truth.
-InverseDepthRange narrow(InverseDepthRange allowed, std::vector<double> depths) {
+/// The depths that the scene shows, but for a thousandth at either end, and some more. A range that is too wide costs
+/// time and a few more ambiguous pixels; one that is too narrow costs the truth.
+/// \param more  as a share of them
+InverseDepthRange narrow(InverseDepthRange allowed, std::vector<double> depths, double more) {
   constexpr std::size_t enough = 100;
   if (depths.size() < enough) return allowed;
   std::sort(depths.begin(), depths.end());
   const std::size_t tail = depths.size() / 1000;
   const double far = depths[tail], near = depths[depths.size() - 1 - tail];
-  const double margin = 0.2 * (near - far) + 0.02 * near;
+  const double margin = more * (near - far + 0.1 * near);
   return {std::max(allowed.far, far - margin), std::min(allowed.near, near + margin)};
+}
+
+/// Few pixels look along their whole curves; many look where those found something, and far around it.
+DepthRanges find_ranges(const Direction& there, const Direction& back, InverseDepthRange allowed) {
+  DepthRanges ranges{allowed, allowed};
+  for (const auto& [probes, more] : {std::pair{1000, 1.0}, {10000, 0.2}}) {
+    const DepthRanges before = ranges;
+    ranges.there = narrow(allowed, probe_depths(there, back, before, probes), more);
+    ranges.back = narrow(allowed, probe_depths(back, there, {before.back, before.there}, probes), more);
+  }
+  return ranges;
 }
 
 Correspondences match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress) {
@@ -111,12 +129,10 @@ MatchPair match_both_ways(const RayTable& first, const RayTable& second, const M
                           const Matcher& from_second, const MatchOptions& options, Progress& progress) {
   const InverseDepthRange allowed = allowed_range(first.camera(), second.camera(), options);
   const Direction there{&first, &second, &from_first}, back{&second, &first, &from_second};
-  InverseDepthRange first_range = allowed, second_range = allowed;
-  if (options.near_mm == 0 || options.far_mm == 0) {
-    first_range = narrow(allowed, probe_depths(there, back, allowed));
-    second_range = narrow(allowed, probe_depths(back, there, allowed));
-  }
-  MatchPair pair{match_one_way(there, first_range, progress), match_one_way(back, second_range, progress)};
+  const bool known = options.near_mm > 0 && options.far_mm > 0;
+  progress.begin("looking for the range of depths");
+  const DepthRanges ranges = known ? DepthRanges{allowed, allowed} : find_ranges(there, back, allowed);
+  MatchPair pair{match_one_way(there, ranges.there, progress), match_one_way(back, ranges.back, progress)};
   keep_agreeing(pair, options.max_disagreement_px);
   return pair;
 }
