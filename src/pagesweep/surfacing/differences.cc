@@ -79,15 +79,14 @@ Differences measure_differences(const HeightField& field, const Image<CellMean>&
                           Image<float>(field.columns(), field.rows(), not_a_number), field.status};
   const Image<std::uint8_t> wide = widen(cells);
   Image<std::uint8_t> known(field.columns(), field.rows(), 0);
-  const double radius = std::max(radius_mm, 2.5 * field.cell_mm);
+  const LocalFitOptions options{std::max(radius_mm, 2.5 * field.cell_mm), 2, 2.5 * std::max(1.0, field.noise_factor)};
+  const Image<LocalFit> fits = fit_cells(gaps, field.cell_mm, options, wide);
   parallel_rows(field.rows(), [&](int j) {
-    LocalFitter fitter(gaps, field.cell_mm);
     for (int i = 0; i < field.columns(); ++i) {
       // A height that was measured but does not belong to this page is off its surface.
       PixelStatus& status = differences.status(i, j);
       if (status == PixelStatus::ok) status = PixelStatus::off_surface;
-      if (!wide(i, j)) continue;
-      const LocalFit fit = fitter.fit_along_edges(i, j, radius, 2, 2.5 * std::max(1.0, field.noise_factor));
+      const LocalFit& fit = fits(i, j);
       if (!fit.ok) continue;
       differences.dz(i, j) = fit.z;
       differences.sigma(i, j) = static_cast<float>(fit.sigma * std::max(field.noise_factor, fit.scatter));

@@ -10,72 +10,51 @@
 namespace pagesweep {
 namespace {
 
-/// Tukey's biweight keeps 95 % efficiency under Gaussian noise with this cut-off.
-constexpr double tukey_cutoff = 4.685;
 /// Variance of the fitted height over that of the weighted mean: about 4 within a window full of cells, 16 at a
 /// straight border, and growing without bound where the fit extrapolates. A paraboloid gives way to a plane before
 /// that.
 constexpr double largest_leverage = 40, largest_leverage_of_paraboloid = 24;
 
-template <int Terms, class Sample>
-Eigen::Matrix<double, Terms, 1> design_row(const Sample& s) {
-  Eigen::Matrix<double, Terms, 1> row;
-  if constexpr (Terms == 6)
-    row << 1, s.u, s.v, s.uu, s.uv, s.vv;
-  else
-    row << 1, s.u, s.v;
-  return row;
-}
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+template <int Terms>
+std::array<float, 6> narrow(const Eigen::Matrix<double, Terms, 1>& coefficients) {
+  std::array<float, 6> narrowed{};
+  for (int k = 0; k < Terms; ++k) narrowed[static_cast<std::size_t>(k)] = static_cast<float>(coefficients(k));
+  return narrowed;
 }
 
 }  // namespace
 
-void LocalFitter::gather(int column, int row, const Window& window) {
-  samples_.clear();
-  const int reach = static_cast<int>(window.radius_mm / cell_mm_) + 1;
-  const bool one_sided = window.towards.squaredNorm() > 0;
-  double nearest = window.radius_mm * window.radius_mm;
+void LocalFitter::gather(int column, int row, const Neighbourhood& neighbourhood) {
+  const double r = neighbourhood.radius_mm, r2 = r * r;
+  const int reach = static_cast<int>(r / cell_mm_) + 1;
+  const bool one_sided = neighbourhood.towards.squaredNorm() > 0;
+  Window& w = window_;
+  w.reserve(static_cast<std::size_t>((2 * reach + 1) * (2 * reach + 1)));
+  double nearest = r2;
+  std::size_t n = 0;
   for (int j = std::max(0, row - reach); j <= std::min(cells_.height() - 1, row + reach); ++j)
     for (int i = std::max(0, column - reach); i <= std::min(cells_.width() - 1, column + reach); ++i) {
       const CellMean& cell = cells_(i, j);
       if (!(cell.weight > 0)) continue;
       const double u = (i - column) * cell_mm_ + cell.p, v = (j - row) * cell_mm_ + cell.q;
-      const double d2 = (u * u + v * v) / (window.radius_mm * window.radius_mm);
+      const double d2 = (u * u + v * v) / r2;
       if (d2 >= 1) continue;
-      if (one_sided && u * window.towards.x() + v * window.towards.y() < -0.75 * cell_mm_) continue;
+      if (one_sided && u * neighbourhood.towards.x() + v * neighbourhood.towards.y() < -0.75 * cell_mm_) continue;
       nearest = std::min(nearest, u * u + v * v);
-      const double r = window.radius_mm;
-      samples_.push_back({u / r, v / r, (u * u + cell.pp) / (r * r), (u * v + cell.pq) / (r * r),
-                          (v * v + cell.qq) / (r * r), cell.z, cell.weight, (1 - d2) * (1 - d2), 1});
+      if (n == 0) w.z0_mm = cell.z;
+      w.u[n] = static_cast<float>(u / r);
+      w.v[n] = static_cast<float>(v / r);
+      w.uu[n] = static_cast<float>((u * u + cell.pp) / r2);
+      w.uv[n] = static_cast<float>((u * v + cell.pq) / r2);
+      w.vv[n] = static_cast<float>((v * v + cell.qq) / r2);
+      w.z[n] = static_cast<float>(cell.z - w.z0_mm);
+      w.weight[n] = cell.weight;
+      w.kernel[n] = static_cast<float>((1 - d2) * (1 - d2));
+      ++n;
     }
+  w.size = n;
+  w.pad();
   nearest_mm_ = std::sqrt(nearest);
-}
-
-template <int Terms>
-double LocalFitter::reweight(const Eigen::Matrix<double, Terms, 1>& solution, bool redescending) {
-  residuals_.clear();
-  for (Sample& s : samples_) {
-    s.robust = std::abs(design_row<Terms>(s).dot(solution) - s.z) * std::sqrt(s.weight);  // for now
-    residuals_.push_back(s.robust);
-  }
-  const double freedom = static_cast<double>(Terms) / static_cast<double>(samples_.size());
-  const double scale = 1.4826 * median_of(residuals_) / std::sqrt(std::max(0.1, 1 - freedom));
-  const double unit = std::max(1.0, scale);
-  for (Sample& s : samples_) {
-    const double x = s.robust / unit;
-    if (redescending) {
-      const double y = 1 - x * x / (tukey_cutoff * tukey_cutoff);
-      s.robust = y > 0 ? y * y : 0;
-    } else {
-      s.robust = 1 / std::max(1.0, x);
-    }
-  }
-  return scale;
 }
 
 template <int Terms>
@@ -83,52 +62,47 @@ LocalFit LocalFitter::solve(double radius_mm, int steps) {
   using Vector = Eigen::Matrix<double, Terms, 1>;
   using Matrix = Eigen::Matrix<double, Terms, Terms>;
   LocalFit fit;
-  if (samples_.size() < 2 * Terms) return fit;
+  if (window_.size < 2 * Terms) return fit;
+  std::fill_n(window_.robust.begin(), window_.size, 1.0f);
+  const double freedom = 1 - static_cast<double>(Terms) / static_cast<double>(window_.size);
   Vector solution = Vector::Zero();
   Eigen::LDLT<Matrix> normal_equations;
   double total = 0;
   for (int step = 0; step <= steps; ++step) {
-    Matrix a = Matrix::Zero();
-    Vector b = Vector::Zero();
-    total = 0;
-    for (const Sample& s : samples_) {
-      const double w = s.weight * s.kernel * s.robust;
-      const Vector row = design_row<Terms>(s);
-      const Vector weighted = w * row;
-      a.noalias() += weighted * row.transpose();
-      b += s.z * weighted;
-      total += w;
-    }
+    const WindowSums sums = add_up(window_);
+    Matrix a;
+    for (int row = 0, at = 0; row < 6; ++row)
+      for (int column = row; column < 6; ++column, ++at)
+        if (column < Terms) a(row, column) = a(column, row) = sums.a[static_cast<std::size_t>(at)];
+    total = sums.a[0];
     normal_equations.compute(a);
     const auto pivots = normal_equations.vectorD();
     if (!(pivots.minCoeff() > 1e-9 * pivots.maxCoeff())) return fit;
-    solution = normal_equations.solve(b);
-    if (step < steps || steps == 0) fit.scatter = reweight<Terms>(solution, 2 * step >= steps);
+    solution = normal_equations.solve(Eigen::Map<const Vector>(sums.b.data()));
+    if (step == steps && steps > 0) break;
+    find_residuals(narrow(solution), window_);
+    fit.scatter = 1.4826 * median_residual(window_) / std::sqrt(std::max(0.1, freedom));
+    weigh_residuals(std::max(1.0, fit.scatter), 2 * step >= steps, window_);
   }
   const Vector influence = normal_equations.solve(Vector::Unit(0));
-  double variance = 0, weights = 0;
-  for (const Sample& s : samples_) {
-    const double l = s.kernel * s.robust * design_row<Terms>(s).dot(influence);
-    variance += l * l * s.weight;
-    weights += s.weight;
-  }
   if (!(influence(0) * total < (Terms == 6 ? largest_leverage_of_paraboloid : largest_leverage))) return fit;
+  double weights = 0;
+  for (std::size_t k = 0; k < window_.size; ++k) weights += window_.weight[k];
   fit.ok = true;
-  fit.z = solution(0);
-  fit.sigma = std::sqrt(variance);
-  fit.scatter_mm = fit.scatter / std::sqrt(weights / static_cast<double>(samples_.size()));
+  fit.z = window_.z0_mm + solution(0);
+  fit.sigma = std::sqrt(sum_of_influence(narrow(influence), window_));
+  fit.scatter_mm = fit.scatter / std::sqrt(weights / static_cast<double>(window_.size));
   for (int i = 1; i < Terms; ++i)
     fit.slopes[static_cast<std::size_t>(i - 1)] = solution(i) / (i < 3 ? radius_mm : radius_mm * radius_mm);
   return fit;
 }
 
-LocalFit LocalFitter::fit(int column, int row, const Window& window, int steps) {
-  gather(column, row, window);
+LocalFit LocalFitter::fit(int column, int row, const Neighbourhood& neighbourhood, int steps) {
+  gather(column, row, neighbourhood);
   // A fit may bridge a gap of a few cells, not more.
-  if (samples_.empty() || nearest_mm_ > std::max(0.35 * window.radius_mm, 1.5 * cell_mm_)) return {};
-  if (const LocalFit paraboloid = solve<6>(window.radius_mm, steps); paraboloid.ok) return paraboloid;
-  for (Sample& s : samples_) s.robust = 1;
-  return solve<3>(window.radius_mm, steps);
+  if (window_.size == 0 || nearest_mm_ > std::max(0.35 * neighbourhood.radius_mm, 1.5 * cell_mm_)) return {};
+  if (const LocalFit paraboloid = solve<6>(neighbourhood.radius_mm, steps); paraboloid.ok) return paraboloid;
+  return solve<3>(neighbourhood.radius_mm, steps);
 }
 
 LocalFit LocalFitter::fit_along_edges(int column, int row, double radius_mm, int steps, double too_much) {
@@ -143,6 +117,7 @@ LocalFit LocalFitter::fit_along_edges(int column, int row, double radius_mm, int
     const double angle = k * std::numbers::pi / 4;
     offer(fit(column, row, {radius_mm, {std::cos(angle), std::sin(angle)}}, steps));
   }
+  best.at_edge = true;
   return best;
 }
 

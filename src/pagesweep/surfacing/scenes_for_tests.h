@@ -112,18 +112,8 @@ struct FlatteningError {
   int nodes = 0;
 };
 
-/// Nodes that are not measured do not count.
-/// \param paper_from_rig  true paper coordinates (s, t) of the paper spot at (x, y); NaN where there is no paper
-inline FlatteningError flattening_error(const PageSurface& page, const Image<Eigen::Vector3f>& nodes,
-                                        const std::function<Eigen::Vector2d(double x, double y)>& paper_from_rig) {
-  std::vector<Eigen::Vector2d> is, should;
-  for (int j = 0; j < page.rows(); ++j)
-    for (int i = 0; i < page.columns(); ++i) {
-      const Eigen::Vector2d truth = paper_from_rig(nodes(i, j).x(), nodes(i, j).y());
-      if (!truth.allFinite() || page.status(i, j) != PixelStatus::ok) continue;
-      is.emplace_back(page.s_of(i), page.t_of(j));
-      should.push_back(truth);
-    }
+/// The distances that the best rigid alignment leaves.
+inline FlatteningError align(const std::vector<Eigen::Vector2d>& is, const std::vector<Eigen::Vector2d>& should) {
   FlatteningError error;
   error.nodes = static_cast<int>(is.size());
   Eigen::Vector2d a = Eigen::Vector2d::Zero(), b = a;
@@ -148,6 +138,21 @@ inline FlatteningError flattening_error(const PageSurface& page, const Image<Eig
   }
   error.rms_mm = std::sqrt(error.rms_mm);
   return error;
+}
+
+/// Nodes that are not measured do not count.
+/// \param paper_from_rig  true paper coordinates (s, t) of the paper spot at (x, y); NaN where there is no paper
+inline FlatteningError flattening_error(const PageSurface& page, const Image<Eigen::Vector3f>& nodes,
+                                        const std::function<Eigen::Vector2d(double x, double y)>& paper_from_rig) {
+  std::vector<Eigen::Vector2d> is, should;
+  for (int j = 0; j < page.rows(); ++j)
+    for (int i = 0; i < page.columns(); ++i) {
+      const Eigen::Vector2d truth = paper_from_rig(nodes(i, j).x(), nodes(i, j).y());
+      if (!truth.allFinite() || page.status(i, j) != PixelStatus::ok) continue;
+      is.emplace_back(page.s_of(i), page.t_of(j));
+      should.push_back(truth);
+    }
+  return align(is, should);
 }
 
 /// An open book: both pages rise from the gutter by 50 degrees and bend over, to 4 degrees downwards at the outer edge.

@@ -169,23 +169,22 @@ Image<CellMean> median_points(const HeightField& field) {
 
 /// Robust fits to the median points, every few cells, and the noise they show.
 Image<LocalFit> first_fits(const Image<CellMean>& medians, HeightField& field, double radius_mm) {
-  Image<LocalFit> fits((field.columns() - 1) / first_pass_step + 1, (field.rows() - 1) / first_pass_step + 1);
-  const auto fit_all = [&](double too_much) {
-    parallel_rows(fits.height(), [&](int j) {
-      LocalFitter fitter(medians, field.cell_mm);
-      for (int i = 0; i < fits.width(); ++i)
-        if (!fits(i, j).ok || fits(i, j).scatter > too_much)
-          fits(i, j) = fitter.fit_along_edges(i * first_pass_step, j * first_pass_step, radius_mm, 6, too_much);
-    });
-  };
-  fit_all(std::numeric_limits<double>::infinity());
+  constexpr int steps = 6;
+  Image<LocalFit> fits =
+      fit_lattice(medians, field.cell_mm, first_pass_step, {radius_mm, steps, std::numeric_limits<double>::infinity()});
   std::vector<double> scatters;
   for (const LocalFit& fit : fits.pixels())
     if (fit.ok) scatters.push_back(fit.scatter);
   if (scatters.empty()) return fits;
   std::ranges::nth_element(scatters, scatters.begin() + static_cast<std::ptrdiff_t>(scatters.size() / 2));
   field.noise_factor = std::max(0.1, scatters[scatters.size() / 2]);
-  fit_all(edge_scatter * std::max(1.0, field.noise_factor));
+  const double too_much = edge_scatter * std::max(1.0, field.noise_factor);
+  parallel_rows(fits.height(), [&](int j) {
+    LocalFitter fitter(medians, field.cell_mm);
+    for (int i = 0; i < fits.width(); ++i)
+      if (fits(i, j).ok && fits(i, j).scatter > too_much)
+        fits(i, j) = fitter.fit_along_edges(i * first_pass_step, j * first_pass_step, radius_mm, steps, too_much);
+  });
   return fits;
 }
 
@@ -226,10 +225,12 @@ void keep_inliers(const Image<LocalFit>& fits, HeightField& field) {
 }
 
 void fit_all_cells(HeightField& field, double radius_mm) {
+  const double too_much = edge_scatter * std::max(1.0, field.noise_factor);
+  const Image<LocalFit> fits = fit_cells(field.cells, field.cell_mm, {radius_mm, 2, too_much, true},
+                                         Image<std::uint8_t>(field.columns(), field.rows(), 1));
   parallel_rows(field.rows(), [&](int j) {
-    LocalFitter fitter(field.cells, field.cell_mm);
     for (int i = 0; i < field.columns(); ++i) {
-      const LocalFit fit = fitter.fit_along_edges(i, j, radius_mm, 2, edge_scatter * std::max(1.0, field.noise_factor));
+      const LocalFit& fit = fits(i, j);
       if (field.cells(i, j).count > 0) field.intensity(i, j) = field.cells(i, j).intensity;
       if (!fit.ok) continue;
       field.z(i, j) = static_cast<float>(fit.z);
