@@ -41,10 +41,17 @@ Eigen::Vector3d interpolate(const PageSurface& surface, const Image<Eigen::Vecto
   const double dj = std::clamp(j - j0, 0.0, 1.0);
   const auto wi = catmull_rom_weights(di);
   const auto wj = catmull_rom_weights(dj);
+  const bool inside = i0 >= 1 && j0 >= 1 && i0 + 2 < nodes.width() && j0 + 2 < nodes.height();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (int b = 0; b < 4; ++b)
-    for (int a = 0; a < 4; ++a)
-      sum += wi[static_cast<std::size_t>(a)] * wj[static_cast<std::size_t>(b)] * node(nodes, i0 - 1 + a, j0 - 1 + b);
+    for (int a = 0; a < 4; ++a) {
+      const double weight = wi[static_cast<std::size_t>(a)] * wj[static_cast<std::size_t>(b)];
+      const int column = i0 - 1 + a, row = j0 - 1 + b;
+      if (inside)
+        sum += weight * nodes(column, row).cast<double>();
+      else
+        sum += weight * node(nodes, column, row);
+    }
   if (const double beyond = i - i0 - di; beyond != 0) sum += beyond * (node(nodes, i0 + 1, j0) - node(nodes, i0, j0));
   if (const double beyond = j - j0 - dj; beyond != 0) sum += beyond * (node(nodes, i0, j0 + 1) - node(nodes, i0, j0));
   return sum;

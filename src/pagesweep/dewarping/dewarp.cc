@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "pagesweep/base/parallel.h"
 #include "pagesweep/dewarping/page_outline.h"
 #include "pagesweep/dewarping/paper_view.h"
 #include "pagesweep/dewarping/scan_map.h"
@@ -79,12 +80,13 @@ std::vector<Page> dewarp(std::span<const PageSurface> surfaces, const Picture& s
   progress.begin("flat pages");
   const PaperShape shape = options.difference_vector ? PaperShape::measured : PaperShape::model;
   std::vector<PaperView> views;
-  std::vector<PageOutline> outlines;
-  for (const PageSurface& surface : surfaces) {
-    views.emplace_back(surface, scanner, shape);
-    outlines.push_back(find_page_outline(views.back(), scan, {options.deskew, options.crop, options.margin_mm}));
-    warn_of_missing_edges(outlines.back(), surface.index, progress);
-  }
+  for (const PageSurface& surface : surfaces) views.emplace_back(surface, scanner, shape);
+  std::vector<PageOutline> outlines(views.size());
+  parallel_rows(static_cast<int>(views.size()), [&](int k) {
+    const auto n = static_cast<std::size_t>(k);
+    outlines[n] = find_page_outline(views[n], scan, {options.deskew, options.crop, options.margin_mm});
+  });
+  for (std::size_t k = 0; k < views.size(); ++k) warn_of_missing_edges(outlines[k], surfaces[k].index, progress);
   const double pixels_per_mm = choose_pixels_per_mm(views, outlines, scan, options);
   const Occlusion occlusion(views);
   std::vector<Page> pages;

@@ -22,8 +22,9 @@ class Lattice {
  public:
   Lattice(const PaperView& view, const Occlusion& occlusion, const PageFrame& frame, double pixels_per_mm)
       : view_(view), occlusion_(occlusion), frame_(frame), pixels_per_mm_(pixels_per_mm) {
-    // Three nodes from one node of the surface to the next see all that its spline does between them.
-    pitch_ = static_cast<int>(std::clamp(view.surface().spacing_mm * pixels_per_mm / 3, 2.0, 16.0));
+    // Two nodes from one node of the surface to the next see what its spline does between them; where that is too much
+    // for this lattice, the middle of a cell shows it.
+    pitch_ = static_cast<int>(std::clamp(view.surface().spacing_mm * pixels_per_mm / 2, 2.0, 16.0));
     columns_ = (frame.width_px(pixels_per_mm) - 1) / pitch_ + 1;
     rows_ = (frame.height_px(pixels_per_mm) - 1) / pitch_ + 1;
     nodes_ = Image<Eigen::Vector2d>(columns_ + 3, rows_ + 3, Eigen::Vector2d::Zero());
@@ -56,14 +57,12 @@ class Lattice {
     return sum;
   }
 
-  /// The four lattice columns around cell (i, j), already interpolated along y: what a row of pixels needs.
-  std::array<Eigen::Vector2d, 4> columns_at(int i, int j, const Weights& wy) const {
-    std::array<Eigen::Vector2d, 4> columns;
-    for (int a = 0; a < 4; ++a) {
-      Eigen::Vector2d& sum = columns[static_cast<std::size_t>(a)] = Eigen::Vector2d::Zero();
-      for (int b = 0; b < 4; ++b) sum += wy[static_cast<std::size_t>(b)] * nodes_(i + a, j + b);
-    }
-    return columns;
+  /// A row of pixels of cells (., j): the lattice, already interpolated along y.
+  void interpolate_row(int j, const Weights& wy, std::vector<Eigen::Vector2d>& row) const {
+    row.resize(static_cast<std::size_t>(nodes_.width()));
+    for (int i = 0; i < nodes_.width(); ++i)
+      row[static_cast<std::size_t>(i)] =
+          wy[0] * nodes_(i, j) + wy[1] * nodes_(i, j + 1) + wy[2] * nodes_(i, j + 2) + wy[3] * nodes_(i, j + 3);
   }
 
   /// Page pixel (x, y) without interpolation; nothing if it is hidden.
@@ -96,25 +95,41 @@ class Lattice {
   Image<char> seen_;
 };
 
-/// Fills the map's pixels of lattice cell (i, j).
-void fill_cell(const Lattice& lattice, int i, int j, double tolerance_px, const std::vector<Weights>& weights,
-               ScanMap& map) {
+/// The Catmull-Rom cubic between the second and third of four samples, at k / pitch for k = 0 ... count - 1.
+/// In float, what is large must come last.
+void fill_cubic(const std::array<double, 4>& p, int pitch, int count, float* out) {
+  const auto c0 = static_cast<float>(p[1]), c1 = static_cast<float>(0.5 * (p[2] - p[0]));
+  const auto c2 = static_cast<float>(p[0] - 2.5 * p[1] + 2 * p[2] - 0.5 * p[3]);
+  const auto c3 = static_cast<float>(0.5 * (p[3] - p[0]) + 1.5 * (p[1] - p[2]));
+  const float step = 1 / static_cast<float>(pitch);
+  for (int k = 0; k < count; ++k) {
+    const float x = static_cast<float>(k) * step;
+    out[k] = c0 + x * (c1 + x * (c2 + x * c3));
+  }
+}
+
+/// Fills the map's pixels in the j-th row of lattice cells.
+void fill_cells(const Lattice& lattice, int j, double tolerance_px, ScanMap& map) {
   const int pitch = lattice.pitch();
-  const int x_end = std::min((i + 1) * pitch, map.width());
-  const int y_end = std::min((j + 1) * pitch, map.height());
-  const bool smooth = lattice.is_smooth(i, j, tolerance_px);
-  for (int y = j * pitch; y < y_end; ++y) {
-    const auto columns = lattice.columns_at(i, j, weights[static_cast<std::size_t>(y - j * pitch)]);
-    for (int x = i * pitch; x < x_end; ++x) {
-      const Weights& w = weights[static_cast<std::size_t>(x - i * pitch)];
-      std::optional<Eigen::Vector2d> pixel;
-      if (smooth)
-        pixel = w[0] * columns[0] + w[1] * columns[1] + w[2] * columns[2] + w[3] * columns[3];
-      else
-        pixel = lattice.see(x, y);
-      if (!pixel) continue;
-      map.u(x, y) = static_cast<float>(pixel->x());
-      map.v(x, y) = static_cast<float>(pixel->y());
+  std::vector<char> smooth(static_cast<std::size_t>(lattice.columns()));
+  for (int i = 0; i < lattice.columns(); ++i)
+    smooth[static_cast<std::size_t>(i)] = lattice.is_smooth(i, j, tolerance_px);
+  std::vector<Eigen::Vector2d> row;
+  for (int y = j * pitch; y < std::min((j + 1) * pitch, map.height()); ++y) {
+    lattice.interpolate_row(j, catmull_rom_weights(double(y - j * pitch) / pitch), row);
+    for (int i = 0; i < lattice.columns(); ++i) {
+      const int begin = i * pitch, end = std::min(begin + pitch, map.width());
+      if (smooth[static_cast<std::size_t>(i)]) {
+        const Eigen::Vector2d* p = &row[static_cast<std::size_t>(i)];
+        fill_cubic({p[0].x(), p[1].x(), p[2].x(), p[3].x()}, pitch, end - begin, &map.u(begin, y));
+        fill_cubic({p[0].y(), p[1].y(), p[2].y(), p[3].y()}, pitch, end - begin, &map.v(begin, y));
+        continue;
+      }
+      for (int x = begin; x < end; ++x)
+        if (const auto pixel = lattice.see(x, y)) {
+          map.u(x, y) = static_cast<float>(pixel->x());
+          map.v(x, y) = static_cast<float>(pixel->y());
+        }
     }
   }
 }
@@ -126,12 +141,8 @@ ScanMap build_scan_map(const PaperView& view, const Occlusion& occlusion, const 
   if (!(pixels_per_mm > 0) || !(tolerance_px > 0))
     throw std::invalid_argument("build_scan_map: pixels_per_mm and tolerance_px must be positive");
   const Lattice lattice(view, occlusion, frame, pixels_per_mm);
-  std::vector<Weights> weights;
-  for (int k = 0; k < lattice.pitch(); ++k) weights.push_back(catmull_rom_weights(double(k) / lattice.pitch()));
   ScanMap map(frame.width_px(pixels_per_mm), frame.height_px(pixels_per_mm));
-  parallel_rows(lattice.rows(), [&](int j) {
-    for (int i = 0; i < lattice.columns(); ++i) fill_cell(lattice, i, j, tolerance_px, weights, map);
-  });
+  parallel_rows(lattice.rows(), [&](int j) { fill_cells(lattice, j, tolerance_px, map); });
   return map;
 }
 

@@ -35,19 +35,37 @@ Image<std::uint8_t> widen(const Image<CellMean>& page) {
   return wide;
 }
 
-/// Fills the cells without a measurement with the solution of a screened membrane, laplace(dz) = dz / ease^2, that
-/// hangs from the measured ones: it goes on smoothly and eases to 0.
+/// Cells without a measurement, row by row, as far from the measured ones as the membrane reaches.
+std::vector<std::pair<int, int>> cells_to_ease(const Image<std::uint8_t>& known, double cell_mm) {
+  const int reach = static_cast<int>(2 * ease_mm / cell_mm) + 1;
+  int i0 = known.width(), i1 = -1, j0 = known.height(), j1 = -1;
+  for (int j = 0; j < known.height(); ++j)
+    for (int i = 0; i < known.width(); ++i)
+      if (known(i, j)) {
+        i0 = std::min(i0, i);
+        i1 = std::max(i1, i);
+        j0 = std::min(j0, j);
+        j1 = j;
+      }
+  std::vector<std::pair<int, int>> cells;
+  for (int j = std::max(0, j0 - reach); j <= std::min(known.height() - 1, j1 + reach); ++j)
+    for (int i = std::max(0, i0 - reach); i <= std::min(known.width() - 1, i1 + reach); ++i)
+      if (!known(i, j)) cells.emplace_back(i, j);
+  return cells;
+}
+
+/// Fills the cells around the measured ones with the solution of a screened membrane, laplace(dz) = dz / ease^2, that
+/// hangs from them: it goes on smoothly and eases to 0.
 void ease_out(Image<double>& dz, const Image<std::uint8_t>& known, double cell_mm) {
   const double screen = 4 + std::pow(cell_mm / ease_mm, 2);
   const double relaxation = 1.7;
+  const auto cells = cells_to_ease(known, cell_mm);
   for (int sweep = 0; sweep < 60; ++sweep)
-    for (int j = 0; j < dz.height(); ++j)
-      for (int i = 0; i < dz.width(); ++i) {
-        if (known(i, j)) continue;
-        const double sum = (i > 0 ? dz(i - 1, j) : 0) + (i + 1 < dz.width() ? dz(i + 1, j) : 0) +
-                           (j > 0 ? dz(i, j - 1) : 0) + (j + 1 < dz.height() ? dz(i, j + 1) : 0);
-        dz(i, j) += relaxation * (sum / screen - dz(i, j));
-      }
+    for (const auto& [i, j] : cells) {
+      const double sum = (i > 0 ? dz(i - 1, j) : 0) + (i + 1 < dz.width() ? dz(i + 1, j) : 0) +
+                         (j > 0 ? dz(i, j - 1) : 0) + (j + 1 < dz.height() ? dz(i, j + 1) : 0);
+      dz(i, j) += relaxation * (sum / screen - dz(i, j));
+    }
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "pagesweep/base/error.h"
+#include "pagesweep/base/parallel.h"
 #include "pagesweep/surfacing/find_gutter.h"
 #include "pagesweep/surfacing/find_paper.h"
 #include "pagesweep/surfacing/lay_flat.h"
@@ -109,9 +110,12 @@ RulingFrame meeting_line(const RuledSurface& left, const RuledSurface& right, co
 std::vector<FittedPage> fit_both_pages(const HeightField& field, const Image<std::uint8_t>& paper, RulingFrame gutter,
                                        const SurfaceOptions& options) {
   const auto fit = [&](double gap_mm) {
-    std::vector<FittedPage> pages;
-    for (const GutterSide side : {GutterSide::right, GutterSide::left})  // of the left page, of the right page
-      pages.push_back(fit_page(field, side_of(field, paper, gutter, side, gap_mm), side, gutter, options));
+    std::vector<FittedPage> pages(2);
+    parallel_rows(2, [&](int k) {
+      const GutterSide side = k == 0 ? GutterSide::right : GutterSide::left;  // of the left page, of the right page
+      pages[static_cast<std::size_t>(k)] =
+          fit_page(field, side_of(field, paper, gutter, side, gap_mm), side, gutter, options);
+    });
     return pages;
   };
   for (const double gap_mm : {2.0, 0.5}) {
@@ -167,11 +171,12 @@ std::vector<PageSurface> fit_surface(std::span<const PointMap> cameras, const Su
     fitted.push_back(fit_page(field, cells_of(field, paper), GutterSide::none, std::nullopt, options));
   progress.advance(0.75);
 
-  std::vector<PageSurface> pages;
-  for (const FittedPage& page : fitted) {
-    pages.push_back(finish_page(page, field, options));
-    pages.back().index = static_cast<int>(pages.size());
-  }
+  std::vector<PageSurface> pages(fitted.size());
+  parallel_rows(static_cast<int>(fitted.size()), [&](int k) {
+    const auto n = static_cast<std::size_t>(k);
+    pages[n] = finish_page(fitted[n], field, options);
+    pages[n].index = k + 1;
+  });
   progress.advance(1);
   return pages;
 }

@@ -73,8 +73,12 @@ class Relaxation {
 
   void run() {
     double before = energy(edges_, places_);
+    bool factorised = false;
+    double last_move = 0;
     for (int step = 0; step < most_steps; ++step) {
-      Eigen::VectorXd move = solve();
+      // The matrix hardly changes near the solution: it is factorised anew only if steps do not shrink fast without.
+      if (!factorised) factorise();
+      Eigen::VectorXd move = cholesky_.solve(-gradient());
       Eigen::VectorXd trial = places_ + move;
       double after = energy(edges_, trial);
       for (int halving = 0; halving < 8 && !(after <= before); ++halving) {
@@ -85,7 +89,10 @@ class Relaxation {
       if (!(after <= before)) return;
       places_ = trial;
       before = after;
-      if (move.lpNorm<Eigen::Infinity>() < settled_mm) return;
+      const double largest_move = move.lpNorm<Eigen::Infinity>();
+      if (largest_move < settled_mm) return;
+      factorised = step == 0 || largest_move < 0.1 * last_move;
+      last_move = largest_move;
     }
   }
 
@@ -103,18 +110,28 @@ class Relaxation {
   }
 
  private:
-  Eigen::VectorXd solve() {
-    std::vector<Eigen::Triplet<double>> entries;
-    entries.reserve(16 * edges_.size());
+  /// Derivative of an edge's residual sqrt(weight) (length / length_mm - 1) by its end `to`, and the residual.
+  std::pair<Eigen::Vector2d, double> derivative(const Edge& e) const {
+    const Eigen::Vector2d along = places_.segment<2>(2 * e.to) - places_.segment<2>(2 * e.from);
+    const double length = along.norm(), root = std::sqrt(e.weight);
+    return {root * along / (length * e.length_mm), root * (length / e.length_mm - 1)};
+  }
+
+  Eigen::VectorXd gradient() const {
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(places_.size());
     for (const Edge& e : edges_) {
-      const Eigen::Vector2d along = places_.segment<2>(2 * e.to) - places_.segment<2>(2 * e.from);
-      const double length = along.norm();
-      const double root = std::sqrt(e.weight);
-      const Eigen::Vector2d g = root * along / (length * e.length_mm);
-      const double residual = root * (length / e.length_mm - 1);
+      const auto [g, residual] = derivative(e);
       gradient.segment<2>(2 * e.to) += residual * g;
       gradient.segment<2>(2 * e.from) -= residual * g;
+    }
+    return gradient;
+  }
+
+  void factorise() {
+    std::vector<Eigen::Triplet<double>> entries;
+    entries.reserve(16 * edges_.size());
+    for (const Edge& e : edges_) {
+      const Eigen::Vector2d g = derivative(e).first;
       for (const int row : {e.from, e.to})
         for (const int column : {e.from, e.to})
           for (int a = 0; a < 2; ++a)
@@ -128,7 +145,6 @@ class Relaxation {
     if (!analysed_) cholesky_.analyzePattern(hessian);
     analysed_ = true;
     cholesky_.factorize(hessian);
-    return cholesky_.solve(-gradient);
   }
 
   std::vector<Edge> edges_;

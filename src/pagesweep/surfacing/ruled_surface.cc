@@ -198,8 +198,10 @@ Fit prepare(std::span<const Support> cells, const RulingFrame& frame, bool gutte
   s.b_high = -1e300;
   std::vector<Eigen::Vector2d> places;
   places.reserve(cells.size());
+  const Eigen::Vector2d across = frame.across(), along = frame.along();
   for (const Support& cell : cells) {
-    places.push_back(frame.ruling_from_plan(cell.plan));
+    const double b = along.dot(cell.plan - frame.origin);
+    places.emplace_back(across.dot(cell.plan - frame.origin) / (1 + frame.fan * b), b);
     from = std::min(from, places.back().x());
     to = std::max(to, places.back().x());
     s.b_low = std::min(s.b_low, places.back().y());
@@ -212,7 +214,7 @@ Fit prepare(std::span<const Support> cells, const RulingFrame& frame, bool gutte
   fit.rows.reserve(cells.size());
   for (std::size_t k = 0; k < cells.size(); ++k) {
     const double stretch = 1 + frame.fan * places[k].y();
-    const double width = frame.across().dot(cells[k].covariance * frame.across()) / (stretch * stretch);
+    const double width = across.dot(cells[k].covariance * across) / (stretch * stretch);
     Row row{s.splines.at(places[k].x()),
             (places[k].y() - s.b_low) / (s.b_high - s.b_low),
             cells[k].z,
@@ -314,7 +316,9 @@ class RulingSearch {
 }  // namespace
 
 Eigen::Vector2d RulingFrame::ruling_from_plan(const Eigen::Vector2d& plan) const {
-  const double a = across().dot(plan - origin), b = along().dot(plan - origin);
+  const double c = std::cos(angle_rad), s = std::sin(angle_rad);
+  const Eigen::Vector2d from_origin = plan - origin;
+  const double a = c * from_origin.x() + s * from_origin.y(), b = c * from_origin.y() - s * from_origin.x();
   return {a / (1 + fan * b), b};
 }
 
