@@ -58,6 +58,12 @@ View::View(const RayTable& rays)
   highest_ += border;
 }
 
+LensNumbers View::lens() const {
+  const auto f = [](double value) { return static_cast<float>(value); };
+  return {f(fx_),      f(fy_),      f(cx_),      f(cy_),      f(lens_.k1),
+          f(lens_.k2), f(lens_.k3), f(lens_.p1), f(lens_.p2), f(max_radius_squared_)};
+}
+
 InverseDepthRange View::clip(const Eigen::Vector3d& a, const Eigen::Vector3d& b, InverseDepthRange range) const {
   // In front of the camera, x/z >= lowest is x - lowest z >= 0: linear in w.
   keep_where_positive(a.z() - 1e-9, b.z(), range);
@@ -112,9 +118,9 @@ EpipolarGeometry::EpipolarGeometry(const RayTable& from, const RayTable& to, Inv
       range_(range) {}
 
 EpipolarCurve EpipolarGeometry::curve(int x, int y) const {
-  const Eigen::Vector3d direction = from_rays_->direction(x, y).homogeneous();
-  if (!direction.allFinite()) return {view_, Eigen::Vector3d(0, 0, -1), Eigen::Vector3d::Zero(), {0, 0}};
-  return {view_, to_from_from_.rotation * direction, to_from_from_.translation, range_};
+  const Eigen::Vector3d a = direction(x, y);
+  if (!a.allFinite()) return {view_, Eigen::Vector3d(0, 0, -1), Eigen::Vector3d::Zero(), {0, 0}};
+  return {view_, a, origin(), range_};
 }
 
 }  // namespace pagesweep

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <optional>
 #include <vector>
 
 #include "pagesweep/camera/camera.h"
 #include "pagesweep/camera/ray_table.h"
+#include "pagesweep/matching/follow_curves.h"
 
 namespace pagesweep {
 
@@ -38,6 +40,7 @@ class View {
   }
 
   double focal_length_px() const { return fx_; }
+  LensNumbers lens() const;
   /// Part of the line a + w b (homogeneous, w in `range`) that can be in the picture: all that is seen and little more.
   InverseDepthRange clip(const Eigen::Vector3d& a, const Eigen::Vector3d& b, InverseDepthRange range) const;
 
@@ -60,6 +63,9 @@ class EpipolarCurve {
   /// Empty if no point within the depth range can be seen. Single points of the range may still be unseen.
   const InverseDepthRange& range() const { return range_; }
   bool contains(double inverse_depth) const { return inverse_depth >= range_.far && inverse_depth <= range_.near; }
+  const Eigen::Vector3d& direction() const { return a_; }
+  const Eigen::Vector3d& origin() const { return b_; }
+  const View& view() const { return *view_; }
   /// [px] in the other picture; nothing if it does not show that point.
   std::optional<Eigen::Vector2d> at(double inverse_depth) const { return view_->locate(a_ + inverse_depth * b_); }
   /// Pixels a unit of inverse depth [px mm], the lens taken as ideal: for the choice of steps.
@@ -94,6 +100,12 @@ class EpipolarGeometry {
   /// \param range  of depths in `from`
   EpipolarGeometry(const RayTable& from, const RayTable& to, InverseDepthRange range);
   EpipolarCurve curve(int x, int y) const;
+  /// A pixel's direction (X/Z, Y/Z, 1), turned into the other camera's frame; NaN where the distortion has no inverse.
+  Eigen::Vector3d direction(int x, int y) const {
+    return to_from_from_.rotation * from_rays_->direction(x, y).homogeneous();
+  }
+  const Eigen::Vector3d& origin() const { return to_from_from_.translation; }  ///< of all rays [mm] in that frame
+  const View& view() const { return view_; }
   const InverseDepthRange& range() const { return range_; }
 
  private:

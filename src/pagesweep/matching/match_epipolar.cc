@@ -115,7 +115,48 @@ class TimeFinder final : public MatchFinder {
     return search(wanted, expected);
   }
 
+  void find_quickly(int x, int y, const EpipolarGeometry& geometry, std::span<const double> expected,
+                    std::span<Match> matches) override {
+    if (from_.width() < 2 || from_.height() < 2) return;
+    prepare(geometry.view(), geometry.origin(), geometry.range());
+    bool any = false;
+    batch_.expected.fill(not_a_number);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      const int row = y + static_cast<int>(i);
+      if (std::isnan(expected[i]) || from_.status(x, row) != PixelStatus::ok) continue;
+      const Eigen::Vector3f direction = geometry.direction(x, row).cast<float>();
+      for (std::size_t axis = 0; axis < 3; ++axis) batch_.direction[axis][i] = direction[static_cast<int>(axis)];
+      batch_.time[i] = from_.time(x, row);
+      batch_.amplitude[i] = from_.amplitude(x, row);
+      batch_.expected[i] = static_cast<float>(expected[i]);
+      any = true;
+    }
+    if (!any) return;
+    follow_curves(batch_);
+    for (std::size_t i = 0; i < expected.size(); ++i)
+      if (std::isfinite(batch_.inverse_depth[i])) matches[i] = judge(i, from_.sigma(x, y + static_cast<int>(i)));
+  }
+
  private:
+  /// What is the same for all pixels.
+  void prepare(const View& view, const Eigen::Vector3d& origin, InverseDepthRange range) {
+    batch_.times = to_.field->arrays();
+    batch_.lens = view.lens();
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      batch_.origin[axis] = static_cast<float>(origin[static_cast<int>(axis)]);
+    batch_.far = static_cast<float>(range.far);
+    batch_.near = static_cast<float>(range.near);
+    batch_.brightness = static_cast<float>(to_.brightness);
+    batch_.most_contrast = static_cast<float>(suspicious);
+  }
+
+  Match judge(std::size_t i, float sigma) const {
+    const double variance = static_cast<double>(sigma) * sigma + batch_.variance[i], slope = batch_.slope[i];
+    const double sigma_px = std::sqrt(variance) / std::abs(slope);
+    if (!(sigma_px <= to_.max_sigma_px)) return Match::none(PixelStatus::ambiguous);
+    return {PixelStatus::ok, {batch_.u[i], batch_.v[i]}, sigma_px, batch_.inverse_depth[i], slope};
+  }
+
   /// A spot of paper is about as bright in both cameras. Light that strays into a dark pixel beside bright paper has
   /// times as well, but not the paper's amplitude: a match of this contrast is looked at twice, of that one refused.
   static constexpr double suspicious = 4, impossible = 8;
@@ -135,12 +176,14 @@ class TimeFinder final : public MatchFinder {
   /// Looks along the whole curve.
   Match search(const Wanted& wanted, double expected);
   Match match_at(double root, const Wanted& wanted) const;
-  void find_roots(const Wanted& wanted);
+  /// \return whether the other camera sees anything of the curve
+  bool find_roots(const Wanted& wanted);
 
   const TimeMap& from_;
   SearchedMap to_;
-  CurveSamples samples_;
+  std::vector<float> ahead_;  ///< along a curve, see search_curve()
   std::vector<double> roots_;
+  CurveBatch batch_{};
 };
 
 class TimeMatcher final : public Matcher {
@@ -173,30 +216,35 @@ std::optional<double> choose(const std::vector<double>& roots, double expected, 
   return clear ? std::optional(nearest) : std::nullopt;
 }
 
-void TimeFinder::find_roots(const Wanted& wanted) {
+bool TimeFinder::find_roots(const Wanted& wanted) {
   const TimeDifference& difference = wanted.difference;
+  const EpipolarCurve& curve = *difference.curve;
+  const auto [far, near] = curve.range();
+  const double pixels = (near - far) * std::max(curve.speed(far), curve.speed(near));
+  constexpr double longest_curve = 200000;  // beside the epipole a curve can be endless
+  const auto count = static_cast<std::size_t>(std::clamp(std::ceil(pixels), 1.0, longest_curve));
+  const double step = (near - far) / static_cast<double>(count);
+  ahead_.resize(count + 1);
+  prepare(curve.view(), curve.origin(), curve.range());
+  const Eigen::Vector3f direction = curve.direction().cast<float>();
+  const bool seen =
+      search_curve(batch_, {direction.x(), direction.y(), direction.z()}, static_cast<float>(difference.time),
+                   static_cast<float>(far), static_cast<float>(step), ahead_);
   roots_.clear();
-  double before = nan;
-  for (int i = 0; i < samples_.size(); ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const Eigen::Vector2d pixel(samples_.u[k], samples_.v[k]);
-    const double value = std::isnan(pixel.x()) ? nan : to_.field->time_at(pixel) - difference.time;
-    if (before * value <= 0) {
-      const double low = samples_.inverse_depth[k - 1], high = samples_.inverse_depth[k];
-      const auto root = solve(difference, {low, high, before, value}, high - low);
-      const bool known = root && !roots_.empty() && *root - roots_.back() < high - low;
-      if (root && !known) roots_.push_back(*root);
-    }
-    before = value;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!(ahead_[k] * ahead_[k + 1] <= 0)) continue;
+    const double low = far + static_cast<double>(k) * step, high = std::min(low + step, near);
+    const double at_low = difference(low), at_high = difference(high);
+    if (!(at_low * at_high <= 0)) continue;
+    const auto root = solve(difference, {low, high, at_low, at_high}, step);
+    const bool known = root && !roots_.empty() && *root - roots_.back() < step;
+    if (root && !known) roots_.push_back(*root);
   }
+  return seen;
 }
 
 Match TimeFinder::search(const Wanted& wanted, double expected) {
-  sample(*wanted.difference.curve, samples_);
-  const auto& columns = samples_.u;
-  if (std::all_of(columns.begin(), columns.begin() + samples_.size(), [](auto u) { return std::isnan(u); }))
-    return Match::none(PixelStatus::outside_view);
-  find_roots(wanted);
+  if (!find_roots(wanted)) return Match::none(PixelStatus::outside_view);
   std::erase_if(roots_, [&](double root) { return contrast(root, wanted) > impossible; });
   const auto is_alike = [&](double root) { return contrast(root, wanted) < suspicious; };
   if (std::ranges::any_of(roots_, is_alike)) std::erase_if(roots_, std::not_fn(is_alike));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "pagesweep/base/parallel.h"
@@ -33,13 +34,24 @@ bool are_linked(const TimeMap& map, int x, int y, int dx, int dy) {
 
 }  // namespace
 
-TimeField::TimeField(const TimeMap& map) : map_(&map), linked_(map.width(), map.height(), 0) {
+TimeField::TimeField(const TimeMap& map) : map_(&map), between_(map.width(), map.height(), not_a_number) {
+  Image<std::uint8_t> linked(map.width(), map.height());
   parallel_rows(map.height(), [&](int y) {
     for (int x = 0; x < map.width(); ++x) {
       const unsigned links = (are_linked(map, x, y, 1, 0) ? right : 0u) | (are_linked(map, x, y, 0, 1) ? below : 0u);
-      linked_(x, y) = static_cast<std::uint8_t>(links);
+      linked(x, y) = static_cast<std::uint8_t>(links);
     }
   });
+  parallel_rows(std::max(0, map.height() - 1), [&](int y) {
+    for (int x = 0; x + 1 < map.width(); ++x)
+      if ((linked(x, y) & right) && (linked(x, y) & below) && (linked(x + 1, y) & below) && (linked(x, y + 1) & right))
+        between_(x, y) = 0;
+  });
+}
+
+TimeArrays TimeField::arrays() const {
+  return {map_->time.data(), map_->sigma.data(), map_->amplitude.data(),
+          between_.data(),   map_->width(),      map_->height()};
 }
 
 TimeField::Cell TimeField::cell_at(const Eigen::Vector2d& pixel) const {
@@ -50,15 +62,9 @@ TimeField::Cell TimeField::cell_at(const Eigen::Vector2d& pixel) const {
   return {column, row, x - column, y - row};
 }
 
-bool TimeField::links(const Cell& cell) const {
-  const unsigned top = linked_(cell.x, cell.y);
-  return (top & right) && (top & below) && (linked_(cell.x + 1, cell.y) & below) &&
-         (linked_(cell.x, cell.y + 1) & right);
-}
-
 double TimeField::time_at(const Eigen::Vector2d& pixel) const {
   const Cell c = cell_at(pixel);
-  if (!map_->time.contains(c.x + 1, c.y + 1) || !links(c)) return std::numeric_limits<double>::quiet_NaN();
+  if (std::isnan(between_(c.x, c.y))) return std::numeric_limits<double>::quiet_NaN();
   const float* top = &map_->time(c.x, c.y);
   const float* bottom = &map_->time(c.x, c.y + 1);
   const double upper = top[0] + c.a * (static_cast<double>(top[1]) - top[0]);

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 
 #include "pagesweep/base/image.h"
 #include "pagesweep/data/time_map.h"
+#include "pagesweep/matching/follow_curves.h"
 
 namespace pagesweep {
 
@@ -24,6 +24,8 @@ class TimeField {
   double amplitude_at(const Eigen::Vector2d& pixel) const;
   /// Variance [frames^2] of time_at, from the pixels' own sigma. \pre time_at is a number
   double variance_at(const Eigen::Vector2d& pixel) const;
+  /// \pre the map is at least 2 x 2
+  TimeArrays arrays() const;
 
  private:
   struct Cell {
@@ -31,10 +33,9 @@ class TimeField {
     double a, b;
   };
   Cell cell_at(const Eigen::Vector2d& pixel) const;
-  bool links(const Cell& cell) const;
 
   const TimeMap* map_;
-  Image<std::uint8_t> linked_;  ///< bit 0: to the pixel at the right, bit 1: to the pixel below
+  Image<float> between_;  ///< 0 where the four pixels from (x, y) to (x + 1, y + 1) are linked, NaN where not
 };
 
 }  // namespace pagesweep

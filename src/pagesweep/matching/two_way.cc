@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -89,7 +90,7 @@ InverseDepthRange narrow(InverseDepthRange allowed, std::vector<double> depths, 
 /// Few pixels look along their whole curves; many look where those found something, and far around it.
 DepthRanges find_ranges(const Direction& there, const Direction& back, InverseDepthRange allowed) {
   DepthRanges ranges{allowed, allowed};
-  for (const auto& [probes, more] : {std::pair{1000, 1.0}, {10000, 0.2}}) {
+  for (const auto& [probes, more] : {std::pair{1000, 1.0}, {5000, 0.2}}) {
     const DepthRanges before = ranges;
     ranges.there = narrow(allowed, probe_depths(there, back, before, probes), more);
     ranges.back = narrow(allowed, probe_depths(back, there, {before.back, before.there}, probes), more);
@@ -97,28 +98,48 @@ DepthRanges find_ranges(const Direction& there, const Direction& back, InverseDe
   return ranges;
 }
 
+void put(const Match& match, int x, int y, Correspondences& matches) {
+  matches.status(x, y) = match.status;
+  if (match.status != PixelStatus::ok) return;
+  matches.u(x, y) = static_cast<float>(match.pixel.x());
+  matches.v(x, y) = static_cast<float>(match.pixel.y());
+  matches.sigma(x, y) = static_cast<float>(match.sigma_px);
+  matches.slope(x, y) = static_cast<float>(match.slope);
+}
+
+constexpr int rows_at_once = 16;
+
+/// Some rows side by side, from left to right.
+void match_rows(const Direction& direction, const EpipolarGeometry& geometry, int top, int bottom,
+                Correspondences& matches) {
+  const auto finder = direction.matcher->make_finder();
+  const auto rows = static_cast<std::size_t>(bottom - top);
+  std::array<double, rows_at_once> expected;
+  std::array<Match, rows_at_once> column;
+  expected.fill(nan);
+  for (int x = 0; x < matches.width(); ++x) {
+    column.fill(Match::none(PixelStatus::not_computed));
+    finder->find_quickly(x, top, geometry, std::span(expected).first(rows), std::span(column).first(rows));
+    for (std::size_t row = 0; row < rows; ++row) {
+      const int y = top + static_cast<int>(row);
+      Match& match = column[row];
+      if (match.status == PixelStatus::not_computed) match = find(direction, geometry, *finder, x, y, expected[row]);
+      put(match, x, y, matches);
+      if (match.status == PixelStatus::ok) expected[row] = match.inverse_depth;
+    }
+  }
+}
+
 Correspondences match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress) {
-  constexpr int band = 32;  // rows between two reports of progress
+  constexpr int band = 8 * rows_at_once;  // rows between two reports of progress
   const EpipolarGeometry geometry = direction.geometry(range);
   Correspondences matches(direction.from->width(), direction.from->height());
   progress.begin(fmt::format("matching {} with {}", direction.from->camera().name, direction.to->camera().name));
   for (int top = 0; top < matches.height(); top += band) {
-    parallel_rows(std::min(band, matches.height() - top), [&](int row) {
-      const int y = top + row;
-      const auto finder = direction.matcher->make_finder();
-      double expected = nan;
-      for (int x = 0; x < matches.width(); ++x) {
-        const Match match = find(direction, geometry, *finder, x, y, expected);
-        matches.status(x, y) = match.status;
-        if (match.status != PixelStatus::ok) continue;
-        matches.u(x, y) = static_cast<float>(match.pixel.x());
-        matches.v(x, y) = static_cast<float>(match.pixel.y());
-        matches.sigma(x, y) = static_cast<float>(match.sigma_px);
-        matches.slope(x, y) = static_cast<float>(match.slope);
-        expected = match.inverse_depth;
-      }
-    });
-    progress.advance(std::min(1.0, (top + band) / static_cast<double>(matches.height())));
+    const int rows = std::min(band, matches.height() - top);
+    parallel_ranges(rows, rows_at_once,
+                    [&](int begin, int end) { match_rows(direction, geometry, top + begin, top + end, matches); });
+    progress.advance(static_cast<double>(top + rows) / matches.height());
   }
   return matches;
 }

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <limits>
 #include <memory>
+#include <span>
 
 #include "pagesweep/matching/epipolar_curve.h"
 #include "pagesweep/matching/match_epipolar.h"
@@ -25,12 +26,16 @@ struct Match {
   }
 };
 
-/// Finds matches one after the other, from left to right in a row. It holds scratch memory: one a thread.
+/// Finds matches from left to right. It holds scratch memory: one a thread.
 class MatchFinder {
  public:
   virtual ~MatchFinder() = default;
   /// \param expected  inverse depth of the last match to the left; NaN if there is none
   virtual Match find(int x, int y, const EpipolarCurve& curve, double expected) = 0;
+  /// Quick matches of the pixels (x, y), (x, y + 1), ..., as many as there are `expected` depths: what is clear at
+  /// first sight. Others keep the status not_computed and are left to find().
+  virtual void find_quickly(int /*x*/, int /*y*/, const EpipolarGeometry& /*geometry*/,
+                            std::span<const double> /*expected*/, std::span<Match> /*matches*/) {}
 };
 
 /// One camera's pixels as they can be matched with the other's: what the two matchers differ in.

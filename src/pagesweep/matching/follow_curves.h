@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "pagesweep/camera/camera.h"
+
+namespace pagesweep {
+
+inline constexpr int most_curves = 16;  ///< followed at once; the longest vector
+
+/// A time map to be asked between its pixels, as arrays. Rows follow each other without gaps.
+struct TimeArrays {
+  const float* time;       ///< [frames]
+  const float* sigma;      ///< [frames]
+  const float* amplitude;  ///< [gray values]
+  const float* between;    ///< 0 where times may be interpolated between (x, y) and (x + 1, y + 1), NaN where not
+  int width, height;       ///< [px] at least 2
+};
+
+/// The camera that is looked into.
+struct LensNumbers {
+  float fx, fy, cx, cy;
+  float k1, k2, k3, p1, p2;
+  float max_radius_squared;  ///< of ideal coordinates
+};
+
+/// Pixels that look for their times in the other camera, one entry a pixel. The picture of the point at inverse depth w
+/// is that of direction + w origin.
+struct CurveBatch {
+  template <class T>
+  using Each = std::array<T, most_curves>;
+
+  TimeArrays times;
+  LensNumbers lens;
+  std::array<float, 3> origin;  ///< the pixels' camera's centre in the other camera's frame [mm]
+  float far, near;              ///< [1/mm]
+  float brightness;             ///< of the other camera's pixels over those of this one
+  float most_contrast;          ///< of the amplitudes of a pixel and its match
+
+  alignas(64) std::array<Each<float>, 3> direction;  ///< in the other camera's frame
+  alignas(64) Each<float> time, amplitude;           ///< what is looked for
+  alignas(64) Each<float> expected;                  ///< [1/mm] near the match; NaN: not to be followed
+
+  alignas(64) Each<float> u, v;           ///< [px] of the match
+  alignas(64) Each<float> inverse_depth;  ///< [1/mm] NaN: not found
+  alignas(64) Each<float> slope;          ///< [frames/px] along the curve, over two pixels
+  alignas(64) Each<float> variance;       ///< [frames^2] of the time there
+};
+
+/// Follows a surface from the expected depths to where the times are equal, by secants. What is not found within a few
+/// pixels and steps, or lies beside a gap or the border, or is not as bright as the pixel, is left to a closer look.
+void follow_curves(CurveBatch& batch);
+
+/// How far the other camera's time is ahead of `time` at the inverse depths first + k step of one curve; NaN where it
+/// has no time or does not see. Of the batch, only what is the same for all pixels is read.
+/// \param direction  of the pixel, in the other camera's frame
+/// \return whether the other camera sees any of these places
+bool search_curve(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,
+                  std::span<float> ahead);
+
+}  // namespace pagesweep
