@@ -89,11 +89,12 @@ std::vector<Page> dewarp(std::span<const PageSurface> surfaces, const Picture& s
   for (std::size_t k = 0; k < views.size(); ++k) warn_of_missing_edges(outlines[k], surfaces[k].index, progress);
   const double pixels_per_mm = choose_pixels_per_mm(views, outlines, scan, options);
   const Occlusion occlusion(views);
-  std::vector<Page> pages;
-  for (std::size_t k = 0; k < views.size(); ++k) {
-    pages.push_back(make_page(views[k], occlusion, outlines[k], pixels_per_mm, scan, options.resampling));
-    progress.advance(double(k + 1) / double(views.size()));
-  }
+  std::vector<Page> pages(views.size());
+  parallel_rows(static_cast<int>(views.size()), [&](int k) {
+    const auto n = static_cast<std::size_t>(k);
+    pages[n] = make_page(views[n], occlusion, outlines[n], pixels_per_mm, scan, options.resampling);
+  });
+  progress.advance(1);
   return pages;
 }
 

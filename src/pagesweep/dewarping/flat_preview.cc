@@ -50,20 +50,21 @@ Image<float> filter_squares(const Image<float>& in, int radius, const Choose& ch
 
 double brightness_at(const Picture& scan, const Eigen::Vector2d& pixel) {
   const double u = pixel.x(), v = pixel.y();
-  if (!(u >= 0 && v >= 0 && u <= scan.width() - 1.0 && v <= scan.height() - 1.0))
-    return std::numeric_limits<double>::quiet_NaN();
-  const int x = std::min(static_cast<int>(u), std::max(0, scan.width() - 2));
-  const int y = std::min(static_cast<int>(v), std::max(0, scan.height() - 2));
   const auto look_up = [&]<class T>(const Image<T>& samples) {
+    const int channels = scan.channels, width = samples.width() / channels, height = samples.height();
+    if (!(u >= 0 && v >= 0 && u <= width - 1.0 && v <= height - 1.0)) return std::numeric_limits<double>::quiet_NaN();
+    const int x = std::min(static_cast<int>(u), std::max(0, width - 2));
+    const int y = std::min(static_cast<int>(v), std::max(0, height - 2));
     const auto pixel_sum = [&](int i, int j) {
+      const T* sample = &samples(std::min(i, width - 1) * channels, j);
       double sum = 0;
-      for (int c = 0; c < scan.channels; ++c) sum += samples(std::min(i, scan.width() - 1) * scan.channels + c, j);
+      for (int c = 0; c < channels; ++c) sum += sample[c];
       return sum;
     };
-    const int below = std::min(y + 1, scan.height() - 1);
+    const int below = std::min(y + 1, height - 1);
     const double upper = pixel_sum(x, y) + (u - x) * (pixel_sum(x + 1, y) - pixel_sum(x, y));
     const double lower = pixel_sum(x, below) + (u - x) * (pixel_sum(x + 1, below) - pixel_sum(x, below));
-    return (upper + (v - y) * (lower - upper)) / (scan.channels * double(std::numeric_limits<T>::max()));
+    return (upper + (v - y) * (lower - upper)) / (channels * double(std::numeric_limits<T>::max()));
   };
   return std::visit(look_up, scan.samples);
 }

@@ -66,12 +66,12 @@ struct FittedPage {
 };
 
 FittedPage fit_page(const HeightField& field, Image<CellMean> cells, GutterSide side,
-                    const std::optional<RulingFrame>& gutter, const SurfaceOptions& options) {
+                    const std::optional<RulingFrame>& gutter, bool search, const SurfaceOptions& options) {
   FittedPage page;
   page.gutter = side;
   page.cells = std::move(cells);
   page.places = places_of(field, page.cells);
-  page.model = fit_ruled_surface(page.places, {gutter, options.smoothing});
+  page.model = fit_ruled_surface(page.places, {gutter, search, options.smoothing});
   return page;
 }
 
@@ -106,23 +106,24 @@ RulingFrame meeting_line(const RuledSurface& left, const RuledSurface& right, co
   return {gutter.plan_from_ruling(shift, 0), gutter.angle_rad - std::atan(turn), 0};
 }
 
-/// The gutter is where the pages meet, and the pages are what ends at the gutter: from coarse to fine.
+/// The gutter is where the pages meet, and the pages are what ends at the gutter: from coarse to fine. Until it is
+/// known, parallel rulings will do.
 std::vector<FittedPage> fit_both_pages(const HeightField& field, const Image<std::uint8_t>& paper, RulingFrame gutter,
                                        const SurfaceOptions& options) {
-  const auto fit = [&](double gap_mm) {
+  const auto fit = [&](double gap_mm, bool search) {
     std::vector<FittedPage> pages(2);
     parallel_rows(2, [&](int k) {
       const GutterSide side = k == 0 ? GutterSide::right : GutterSide::left;  // of the left page, of the right page
       pages[static_cast<std::size_t>(k)] =
-          fit_page(field, side_of(field, paper, gutter, side, gap_mm), side, gutter, options);
+          fit_page(field, side_of(field, paper, gutter, side, gap_mm), side, gutter, search, options);
     });
     return pages;
   };
   for (const double gap_mm : {2.0, 0.5}) {
-    const auto pages = fit(gap_mm);
+    const auto pages = fit(gap_mm, false);
     gutter = meeting_line(pages[0].model, pages[1].model, gutter);
   }
-  return fit(0.2);
+  return fit(0.2, true);
 }
 
 /// A gutter, if the layout is a spread or turns out to be one.
@@ -168,7 +169,7 @@ std::vector<PageSurface> fit_surface(std::span<const PointMap> cameras, const Su
   if (gutter)
     fitted = fit_both_pages(field, paper, *gutter, options);
   else
-    fitted.push_back(fit_page(field, cells_of(field, paper), GutterSide::none, std::nullopt, options));
+    fitted.push_back(fit_page(field, cells_of(field, paper), GutterSide::none, std::nullopt, true, options));
   progress.advance(0.75);
 
   std::vector<PageSurface> pages(fitted.size());

@@ -11,7 +11,7 @@ namespace pagesweep {
 namespace {
 
 constexpr double margin_mm = 8;
-constexpr double node_spacing_mm = 4;
+constexpr double node_spacing_mm = 5;
 constexpr double coarsest_spacing_mm = 2, finest_spacing_mm = 0.7;
 constexpr double interpolation_error_mm = 0.01;
 constexpr double guessed_weight = 1e-3;  // of lengths where nothing was measured
@@ -209,7 +209,7 @@ Eigen::Vector2d FlatPage::node_at(const Eigen::Vector2d& paper, Eigen::Vector2d 
   return guess;
 }
 
-PageSurface FlatPage::sample_model(double spacing_mm) const {
+PageSurface FlatPage::empty_page(double spacing_mm) const {
   PageSurface page;
   page.spacing_mm = spacing_mm;
   const int columns = static_cast<int>(std::ceil((high_.x() - low_.x()) / spacing_mm)) + 1;
@@ -220,6 +220,11 @@ PageSurface FlatPage::sample_model(double spacing_mm) const {
   page.gutter_at_left = gutter_ == GutterSide::left;
   page.gutter_at_right = gutter_ == GutterSide::right;
   page.model = Image<Eigen::Vector3f>(columns, rows, Eigen::Vector3f::Zero());
+  return page;
+}
+
+PageSurface FlatPage::sample_model(double spacing_mm) const {
+  PageSurface page = empty_page(spacing_mm);
   for_each_node(page, [&](int i, int j, const Eigen::Vector2d& node) {
     page.model(i, j) = surface_point(node.x(), node.y()).cast<float>();
   });
@@ -227,16 +232,16 @@ PageSurface FlatPage::sample_model(double spacing_mm) const {
 }
 
 PageSurface FlatPage::sample(const PlanFrame& frame) const {
-  PageSurface page = sample_model(spacing_mm_);
+  PageSurface page = empty_page(spacing_mm_);
   page.measured = page.model;
   page.sigma = Image<float>(page.columns(), page.rows(), not_a_number);
   page.status = Image<PixelStatus>(page.columns(), page.rows(), PixelStatus::not_computed);
   for_each_node(page, [&](int i, int j, const Eigen::Vector2d& node) {
-    const Eigen::Vector3d normal = model_normal(node.x(), node.y());
-    const Eigen::Vector3d measured = measured_above(model_, differences_, model_point(node.x(), node.y()), normal);
+    const Eigen::Vector3d point = model_point(node.x(), node.y()), normal = model_normal(node.x(), node.y());
+    const Eigen::Vector3d measured = measured_above(model_, differences_, point, normal);
     look_up_status(measured, normal.z(), page.sigma(i, j), page.status(i, j));
     page.measured(i, j) = frame.rig_from_plan(measured).cast<float>();
-    page.model(i, j) = frame.rig_from_plan(page.model(i, j).cast<double>()).cast<float>();
+    page.model(i, j) = frame.rig_from_plan(follows_ ? measured : point).cast<float>();
   });
   return page;
 }
@@ -268,7 +273,6 @@ void FlatPage::look_up_status(const Eigen::Vector3d& measured, double normal_z, 
   sigma = differences_.sigma(i, j) * static_cast<float>(normal_z);
 }
 
-/// Largest error of the interpolated model in the middle of cells, a sample of them, the gutter's among them.
 /// Largest error of the interpolated model in the middle of cells, a sample of them, the gutter's among them.
 /// \param page  in plan coordinates
 double FlatPage::interpolation_error(const PageSurface& page) const {

@@ -57,6 +57,7 @@ class FlatPage {
   Eigen::Vector2d node_at(const Eigen::Vector2d& paper, Eigen::Vector2d guess) const;
   template <class Use>
   void for_each_node(const PageSurface& page, const Use& use) const;
+  PageSurface empty_page(double spacing_mm) const;
   PageSurface sample_model(double spacing_mm) const;  // in plan coordinates, `model` alone
   double interpolation_error(const PageSurface& page) const;
   double fine_enough_spacing() const;

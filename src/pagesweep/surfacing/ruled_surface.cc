@@ -369,7 +369,8 @@ RuledSurface fit_ruled_surface(std::span<const Support> cells, const RuledFitOpt
   }
   frame.origin = 0.5 * (low + high);
   if (options.gutter) frame = *options.gutter;
-  frame = RulingSearch(cells, options.gutter.has_value(), std::max(1.0, 0.5 * (high - low).y())).search(frame);
+  if (options.search)
+    frame = RulingSearch(cells, options.gutter.has_value(), std::max(1.0, 0.5 * (high - low).y())).search(frame);
 
   Fit fit = prepare(cells, frame, options.gutter.has_value());
   RuledSurface& surface = fit.surface;

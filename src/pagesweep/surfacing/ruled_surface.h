@@ -60,6 +60,7 @@ double height_over(const RuledSurface& surface, const Support& cell);
 
 struct RuledFitOptions {
   std::optional<RulingFrame> gutter;  ///< the gutter is the ruling alpha = 0: origin and angle are fixed by it
+  bool search = true;                 ///< for the rulings' direction and fan; else those of `gutter` are kept
   double smoothing = 1;               ///< multiplies the stiffness that generalised cross-validation chooses
 };
 

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "pagesweep/base/error.h"
@@ -60,19 +61,36 @@ constexpr double edge_scatter = 2.5;  // residuals of so many times the noise ar
 constexpr int first_pass_step = 2;    // [cells] the first fits need not be dense
 constexpr double largest_field_cells = 4e6;
 
+/// Whether a pixel has a point that can be used.
+bool has_point(const PointMap& map, int x, int y) {
+  return map.status(x, y) == PixelStatus::ok && std::isfinite(map.x(x, y) + map.y(x, y) + map.z(x, y)) &&
+         map.sigma(x, y) > 0 && std::isfinite(map.sigma(x, y));
+}
+
+/// The points of one camera, in the order of its pixels.
+void append_points(const PointMap& map, const PlanFrame& frame, std::vector<PlanPoint>& points) {
+  std::vector<std::size_t> first(static_cast<std::size_t>(map.height()) + 1, 0);  // of each row
+  parallel_rows(map.height(), [&](int y) {
+    for (int x = 0; x < map.width(); ++x) first[static_cast<std::size_t>(y) + 1] += has_point(map, x, y);
+  });
+  first[0] = points.size();
+  for (std::size_t y = 0; y + 1 < first.size(); ++y) first[y + 1] += first[y];
+  points.resize(first.back());
+  const double c = std::cos(frame.angle_rad), s = std::sin(frame.angle_rad);
+  parallel_rows(map.height(), [&](int y) {
+    PlanPoint* point = points.data() + first[static_cast<std::size_t>(y)];
+    for (int x = 0; x < map.width(); ++x) {
+      if (!has_point(map, x, y)) continue;
+      const double px = map.x(x, y), py = map.y(x, y);
+      *point++ = {static_cast<float>(c * px + s * py), static_cast<float>(c * py - s * px), map.z(x, y),
+                  std::max(map.sigma(x, y), 1e-3f), map.intensity(x, y)};
+    }
+  });
+}
+
 std::vector<PlanPoint> gather_points(std::span<const PointMap> cameras, const PlanFrame& frame) {
   std::vector<PlanPoint> points;
-  const double c = std::cos(frame.angle_rad), s = std::sin(frame.angle_rad);
-  for (const PointMap& map : cameras)
-    for (int y = 0; y < map.height(); ++y)
-      for (int x = 0; x < map.width(); ++x) {
-        if (map.status(x, y) != PixelStatus::ok) continue;
-        const double px = map.x(x, y), py = map.y(x, y);
-        const float z = map.z(x, y), sigma = map.sigma(x, y);
-        if (!std::isfinite(px + py + z) || !(sigma > 0) || !std::isfinite(sigma)) continue;
-        points.push_back({static_cast<float>(c * px + s * py), static_cast<float>(c * py - s * px), z,
-                          std::max(sigma, 1e-3f), map.intensity(x, y)});
-      }
+  for (const PointMap& map : cameras) append_points(map, frame, points);
   return points;
 }
 
@@ -124,23 +142,37 @@ HeightField empty_field(const std::vector<PlanPoint>& points, const SmoothingOpt
   return field;
 }
 
+/// Counting sort. Each share of the points is counted on its own, so that shares can be put in place side by side, and
+/// the points of a cell remain in their order.
 SortedPoints sort_into_cells(const std::vector<PlanPoint>& points, const HeightField& field) {
-  const std::size_t none = field.z.size();
-  std::vector<std::size_t> cell_of(points.size(), none);
+  constexpr int shares = 8;
+  const int count = static_cast<int>(points.size()), grain = count / shares + 1;
+  const int cells = static_cast<int>(field.z.size());
+  std::vector<int> cell_of(points.size());
+  Image<int> next(cells, shares);  // first the count, then the place of the next point of that cell and share
+  parallel_ranges(count, grain, [&](int begin, int end) {
+    for (int n = begin; n < end; ++n) {
+      const PlanPoint& point = points[static_cast<std::size_t>(n)];
+      const int i = static_cast<int>(std::lround(field.i_of(point.p)));
+      const int j = static_cast<int>(std::lround(field.j_of(point.q)));
+      const int cell = field.z.contains(i, j) ? static_cast<int>(field.index(i, j)) : -1;
+      cell_of[static_cast<std::size_t>(n)] = cell;
+      if (cell >= 0) ++next(cell, begin / grain);
+    }
+  });
   SortedPoints sorted;
-  sorted.first.assign(none + 1, 0);
-  for (std::size_t n = 0; n < points.size(); ++n) {
-    const int i = static_cast<int>(std::lround(field.i_of(points[n].p)));
-    const int j = static_cast<int>(std::lround(field.j_of(points[n].q)));
-    if (!field.z.contains(i, j)) continue;
-    cell_of[n] = field.index(i, j);
-    ++sorted.first[cell_of[n] + 1];
+  sorted.first.assign(static_cast<std::size_t>(cells) + 1, 0);
+  int total = 0;
+  for (int cell = 0; cell < cells; ++cell) {
+    for (int share = 0; share < shares; ++share) total += std::exchange(next(cell, share), total);
+    sorted.first[static_cast<std::size_t>(cell) + 1] = static_cast<std::size_t>(total);
   }
-  for (std::size_t k = 0; k < none; ++k) sorted.first[k + 1] += sorted.first[k];
-  sorted.points.resize(sorted.first[none]);
-  std::vector<std::size_t> next(sorted.first.begin(), sorted.first.end() - 1);
-  for (std::size_t n = 0; n < points.size(); ++n)
-    if (cell_of[n] != none) sorted.points[next[cell_of[n]]++] = points[n];
+  sorted.points.resize(static_cast<std::size_t>(total));
+  parallel_ranges(count, grain, [&](int begin, int end) {
+    for (int n = begin; n < end; ++n)
+      if (const int cell = cell_of[static_cast<std::size_t>(n)]; cell >= 0)
+        sorted.points[static_cast<std::size_t>(next(cell, begin / grain)++)] = points[static_cast<std::size_t>(n)];
+  });
   return sorted;
 }
 
@@ -169,7 +201,7 @@ Image<CellMean> median_points(const HeightField& field) {
 
 /// Robust fits to the median points, every few cells, and the noise they show.
 Image<LocalFit> first_fits(const Image<CellMean>& medians, HeightField& field, double radius_mm) {
-  constexpr int steps = 6;
+  constexpr int steps = 4;
   Image<LocalFit> fits =
       fit_lattice(medians, field.cell_mm, first_pass_step, {radius_mm, steps, std::numeric_limits<double>::infinity()});
   std::vector<double> scatters;
@@ -248,8 +280,10 @@ void tell_reasons(std::span<const PointMap> cameras, HeightField& field) {
   constexpr std::size_t reasons = names_of(PixelStatus{}).size();
   constexpr int widest_gap_px = 256;
   Image<std::array<std::uint16_t, reasons>> votes(field.columns(), field.rows());
+  const Eigen::Matrix3d plan_from_rig =
+      Eigen::AngleAxisd(-field.frame.angle_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   const auto vote = [&](const Eigen::Vector3d& rig, PixelStatus reason) {
-    const Eigen::Vector3d plan = field.frame.plan_from_rig(rig);
+    const Eigen::Vector3d plan = plan_from_rig * rig;
     const int i = static_cast<int>(std::lround(field.i_of(plan.x())));
     const int j = static_cast<int>(std::lround(field.j_of(plan.y())));
     if (votes.contains(i, j)) ++votes(i, j)[static_cast<std::size_t>(reason)];
