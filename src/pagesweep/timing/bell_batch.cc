@@ -58,10 +58,10 @@ class Sums {
 /// Where a bell lies in its table and its samples.
 struct Place {
   const BellTable* table;
-  std::size_t row;    ///< first entry of the table's row
-  const float* gray;  ///< of the row's first sample
-  float time;         ///< [frames] of a bell exactly on the row
-  float phase;        ///< [frames] of the row
+  std::size_t row;       ///< first entry of the table's row
+  std::ptrdiff_t first;  ///< entry of the row's first sample
+  float time;            ///< [frames] of a bell exactly on the row
+  float phase;           ///< [frames] of the row
 };
 
 Place place_of(const BellBatch& batch, std::size_t i) {
@@ -69,8 +69,8 @@ Place place_of(const BellBatch& batch, std::size_t i) {
   const float whole = std::floor(batch.time[i] + 0.5f);
   const int row = static_cast<int>((batch.time[i] - whole + 0.5f) * BellTable::phases + 0.5f);
   const auto phase = static_cast<float>(BellTable::phase_of(row));
-  return {table, static_cast<std::size_t>(row * table->length),
-          batch.gray[i] + (batch.middle + static_cast<int>(whole) - table->reach), whole + phase, phase};
+  return {table, static_cast<std::size_t>(row * table->length), batch.middle + static_cast<int>(whole) - table->reach,
+          whole + phase, phase};
 }
 
 void Approach(BellBatch& batch) {
@@ -84,9 +84,10 @@ void Approach(BellBatch& batch) {
     for (int i = 0; i < batch.count; ++i) {
       const Place place = place_of(batch, static_cast<std::size_t>(i));
       const BellTable& table = *place.table;
+      const float* gray_row = batch.gray[static_cast<std::size_t>(i)] + place.first;
       Vector part[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
       for (int k = 0; k < table.length; k += lanes) {
-        const Vector gray = hn::LoadU(d, place.gray + k);
+        const Vector gray = hn::LoadU(d, gray_row + k);
         const std::size_t at = place.row + static_cast<std::size_t>(k);
         part[0] = hn::MulAdd(hn::LoadU(d, &table.amplitude_weight[at]), gray, part[0]);
         part[1] = hn::MulAdd(hn::LoadU(d, &table.background_weight[at]), gray, part[1]);
@@ -129,16 +130,19 @@ void weigh(const BellBatch& batch, Equations& equations) {
     // A little later than the row's bell, and a little wider: the profile is a little further back on its slope.
     const Vector late = hn::Set(d, batch.time[bell] - place.time), wider = hn::Set(d, batch.width_rest[bell]);
     const auto first = static_cast<float>(-table.reach);
+    const float* gray_row = batch.gray[bell] + place.first;
+    const float* present = batch.present[bell] + place.first;
     Vector after = hn::Iota(d, first - place.phase);
     Vector part[10];
     for (Vector& sum : part) sum = hn::Zero(d);
     for (int k = 0; k < table.length; k += lanes) {
       const std::size_t at = place.row + static_cast<std::size_t>(k);
-      const Vector gray = hn::LoadU(d, place.gray + k), slope = hn::LoadU(d, &table.slope[at]);
+      const Vector gray = hn::LoadU(d, gray_row + k), slope = hn::LoadU(d, &table.slope[at]);
       const Vector profile = hn::NegMulAdd(hn::MulAdd(wider, after, late), slope, hn::LoadU(d, &table.value[at]));
       const Vector model = hn::MulAdd(amplitude, profile, background);
       const Vector variance = hn::MulAdd(gain, hn::Max(model, hn::Zero(d)), read);
-      const Vector weight = hn::Div(hn::LoadU(d, &table.inside[static_cast<std::size_t>(k)]), variance);
+      const Vector use = hn::Mul(hn::LoadU(d, present + k), hn::LoadU(d, &table.inside[static_cast<std::size_t>(k)]));
+      const Vector weight = hn::Div(use, variance);
       const Vector residual = hn::Sub(gray, model);
       const Vector by_profile = hn::Mul(weight, profile), by_slope = hn::Mul(weight, slope);
       const Vector by_residual = hn::Mul(weight, residual);
@@ -162,7 +166,7 @@ void weigh(const BellBatch& batch, Equations& equations) {
 }
 
 void Refine(BellBatch& batch) {
-  constexpr int most_steps = 4;
+  constexpr int most_steps = 12;
   constexpr float small = 0.1f;  // of sigma: the next step would be a hundredth of that
   Equations e;
   Each moved{};
@@ -179,15 +183,15 @@ void Refine(BellBatch& batch) {
       const float amplitude = (aa * e.rp[i] + ab * e.r1[i] + as * e.rs[i]) / determinant;
       const float background = (ab * e.rp[i] + bb * e.r1[i] + bs * e.rs[i]) / determinant;
       const float slope = (as * e.rp[i] + bs * e.r1[i] + ss * e.rs[i]) / determinant;
-      const float time = moved[i] = -slope / batch.amplitude[i];
+      const float time = moved[i] = std::clamp(-slope / batch.amplitude[i], -batch.longest_step, batch.longest_step);
       batch.sigma[i] = std::sqrt(ss / determinant) / batch.amplitude[i];
       batch.chi_square[i] = e.rr[i] - (amplitude * e.rp[i] + background * e.r1[i] + slope * e.rs[i]);
-      batch.good[i] = batch.good[i] && determinant > 0 && std::abs(time) < batch.near + 5 * batch.sigma[i];
+      batch.good[i] = batch.good[i] && determinant > 0;
       if (!batch.good[i]) continue;
-      batch.amplitude[i] += amplitude;
+      batch.amplitude[i] = std::max(batch.amplitude[i] + amplitude, 0.3F * batch.amplitude[i]);
       batch.background[i] += background;
       batch.time[i] += time;
-      batch.good[i] = batch.amplitude[i] > 0 && std::abs(batch.time[i]) <= batch.most_moved;
+      batch.good[i] = std::abs(batch.time[i]) <= batch.most_moved;
       if (batch.good[i] && !(std::abs(time) < small * batch.sigma[i])) is_done = false;
       if (!batch.good[i]) batch.time[i] = 0;
     }

@@ -22,17 +22,20 @@ struct BellBatch {
   float read_variance = 1, gain = 0;
 
   Each<const BellTable*> table{};
-  Each<float> width_rest{};  ///< log width beyond the table's
-  Each<const float*> gray{};
+  Each<float> width_rest{};      ///< log width beyond the table's
+  Each<const float*> gray{};     ///< samples; finite
+  Each<const float*> present{};  ///< for each of them 1, or 0 if it is to be passed over
 
   alignas(64) Each<float> time{}, amplitude{}, background{}, sigma{}, chi_square{};
   Each<bool> good{};
 };
 
 /// Least squares steps with even weights until all good bells are near; what goes astray is good no longer.
+/// \pre all samples are present
 void approach(BellBatch& batch);
 
 /// Gauss-Newton steps with every sample weighted by the noise expected there, until they are small against sigma.
+/// Amplitude, background and time are where they start.
 void refine(BellBatch& batch);
 
 }  // namespace pagesweep

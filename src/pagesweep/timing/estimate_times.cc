@@ -13,6 +13,7 @@
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/timing/learn_profile.h"
 #include "pagesweep/timing/pixel_time_internal.h"
+#include "pagesweep/timing/plain_rows_internal.h"
 #include "pagesweep/timing/row_windows_internal.h"
 
 namespace pagesweep {
@@ -31,71 +32,40 @@ class Estimator {
         judge_(judge),
         options_(options),
         map_(map) {
-    if (tables) plain_.emplace(*tables, noise.sensor(), judge.profile.full_width_half_maximum());
+    if (tables) plain_.emplace(frames, *tables, widths, judge);
   }
 
   /// The pixels left, left + 1, ... of a row.
   void estimate(int y, int left, int columns) {
-    // Fewer standard deviations than this and noise alone would be taken for stripes.
-    constexpr double least_significance = 3.5;
-    row_.read(y, left, columns);
-    log_widths_.resize(static_cast<std::size_t>(columns));
-    widths_.log_row(y, left, log_widths_);
-    for (int x = left; x < left + columns; ++x) {
-      const float log_width = log_widths_[static_cast<std::size_t>(x - left)];
-      if (row_.significance(x) < least_significance)
-        put(x, y, {});
-      else if (!plain_ || !collect(x, log_width))
-        put(x, y, estimate_alone(x, std::exp(log_width)));
-      if (plain_ && plain_->is_full()) fit_collected(y, left);
+    constexpr std::size_t many = 32;  // pixels: it pays to read what lies between them too
+    alone_.clear();
+    if (plain_) {
+      plain_->estimate(y, left, columns, [&](int x, const PixelTime& time) { put(x, y, time); }, alone_);
+    } else {
+      for (int x = left; x < left + columns; ++x) alone_.push_back(x);
     }
-    if (plain_) fit_collected(y, left);
+    if (alone_.size() >= many) row_.read(y, left, columns);
+    for (const int x : alone_) {
+      if (alone_.size() < many) row_.read(y, x, 1);
+      put(x, y, estimate_alone(x, widths_.at(x, y)));
+    }
   }
 
  private:
-  /// \return whether the pixel looks like a plain case
-  bool collect(int x, double log_width) {
-    const int centre = row_.frame(x), reach = plain_->reach();
-    if (centre < reach || centre + reach >= row_.frame_count()) return false;
-    float* gray = plain_->add(centre, log_width);
-    if (!row_.copy(x, centre - reach, {gray, static_cast<std::size_t>(2 * reach + 1)})) {
-      plain_->drop_last();
-      return false;
-    }
-    collected_.push_back(x);
-    return true;
-  }
-
-  void fit_collected(int y, int left) {
-    plain_->fit();
-    for (std::size_t i = 0; i < collected_.size(); ++i) {
-      const int x = collected_[i];
-      const double width = std::exp(log_widths_[static_cast<std::size_t>(x - left)]);
-      const auto time = time_of_plain_bell((*plain_)[static_cast<int>(i)], width, judge_);
-      put(x, y, time ? *time : estimate_alone(x, width));
-    }
-    collected_.clear();
-    plain_->clear();
-  }
-
   PixelTime estimate_alone(int x, double width) {
-    const PixelWindow window = row_.window(x, width);
+    // Fewer standard deviations than this and noise alone would be taken for stripes.
+    constexpr double least_significance = 3.5;
+    if (row_.significance(x) < least_significance) return {};
     switch (options_.estimator) {
       case TimeEstimator::center_of_mass:
-        return time_by_center_of_mass(window, judge_);
+        return time_by_center_of_mass(row_.window(x, width), judge_);
       case TimeEstimator::pairwise:
       case TimeEstimator::profile:
-        return time_by_shift(window, judge_);
+        return time_by_shift(row_.window(x, width), judge_);
       case TimeEstimator::refined:
         break;
     }
-    const PixelTime time = time_by_likelihood(window, judge_);
-    // A start value that was far off had the bell near its window's border: look once more, with the bell in the
-    // middle.
-    const double moved = time.bell_time - window.start.time;
-    if (std::abs(moved) <= 0.25 * judge_.profile.full_width_half_maximum() + 1) return time;
-    const int centre = static_cast<int>(std::lround(std::clamp(time.bell_time, 0.0, judge_.frame_count - 1.0)));
-    return time_by_likelihood(row_.window_at(x, width, centre), judge_);
+    return time_by_likelihood_around(row_.frame(x), [&](int frame) { return row_.window_at(x, width, frame); }, judge_);
   }
 
   void put(int x, int y, const PixelTime& time) {
@@ -112,9 +82,8 @@ class Estimator {
   const PixelJudge& judge_;
   const TimingOptions& options_;
   TimeMap& map_;
-  std::optional<PlainBells> plain_;
-  std::vector<float> log_widths_;
-  std::vector<int> collected_;  ///< columns of the pixels in plain_
+  std::optional<PlainRows> plain_;
+  std::vector<int> alone_;  ///< columns of the pixels that are no plain cases
 };
 
 }  // namespace
@@ -128,7 +97,7 @@ TimeMap estimate_times(const Frames& frames, const StripeProfile& profile, const
   const PixelJudge judge{profile,           FrameNoise(seen, exposures), frames.count(), options.min_amplitude,
                          options.max_sigma, !options.use_saturated};
   std::optional<BellTables> tables;
-  if (options.estimator == TimeEstimator::refined && !options.use_saturated && frame_noise.mean_weight() == 1)
+  if (options.estimator == TimeEstimator::refined && !options.use_saturated && PlainRows::are_possible(frames))
     tables.emplace(profile, RowWindows::reach_around(profile), widths.range());
   TimeMap map(frames.width(), frames.height());
   constexpr int rows_a_step = 128, rows_a_range = 16;
@@ -136,8 +105,8 @@ TimeMap estimate_times(const Frames& frames, const StripeProfile& profile, const
     const int rows = std::min(rows_a_step, frames.height() - first);
     parallel_ranges(rows, rows_a_range, [&](int begin, int end) {
       Estimator estimator(frames, frame_noise, widths, tables ? &*tables : nullptr, judge, options, map);
-      for (int left = 0; left < frames.width(); left += Estimator::columns_at_once)
-        for (int y = first + begin; y < first + end; ++y)
+      for (int y = first + begin; y < first + end; ++y)
+        for (int left = 0; left < frames.width(); left += Estimator::columns_at_once)
           estimator.estimate(y, left, std::min(Estimator::columns_at_once, frames.width() - left));
     });
     progress.advance(static_cast<double>(first + rows) / frames.height());

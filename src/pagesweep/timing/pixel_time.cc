@@ -102,6 +102,7 @@ PixelTime describe(const PixelWindow& window, const Bell& bell, double sigma, do
           .sigma = sigma,
           .amplitude = bell.amplitude,
           .residual = residual,
+          .background = bell.background,
           .bell_time = bell.time,
           .status = judge_bell(window, bell, sigma, judge)};
 }
@@ -135,6 +136,7 @@ std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double w
                    .sigma = sigma,
                    .amplitude = fit.amplitude,
                    .residual = std::sqrt(chi_square),
+                   .background = fit.background,
                    .bell_time = fit.time,
                    .status = dark ? PixelStatus::too_dark : PixelStatus::ok};
 }

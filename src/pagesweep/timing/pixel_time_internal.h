@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "pagesweep/data/status.h"
@@ -11,11 +13,12 @@ namespace pagesweep {
 
 /// What an estimator says about one pixel.
 struct PixelTime {
-  double time = 0;       ///< [frames]
-  double sigma = 0;      ///< [frames]
-  double amplitude = 0;  ///< [gray values]
-  double residual = 0;   ///< rms over the noise expected
-  double bell_time = 0;  ///< [frames] where the bell was found, whatever the status
+  double time = 0;        ///< [frames]
+  double sigma = 0;       ///< [frames]
+  double amplitude = 0;   ///< [gray values]
+  double residual = 0;    ///< rms over the noise expected
+  double background = 0;  ///< [gray values]
+  double bell_time = 0;   ///< [frames] where the bell was found, whatever the status
   PixelStatus status = PixelStatus::too_dark;
 };
 
@@ -41,6 +44,17 @@ PixelTime time_by_shift(const PixelWindow& window, const PixelJudge& judge);
 /// second opinion, and replaces the first where the two contradict each other (Hausman 1978: an efficient estimate is
 /// doubted when a robust one differs by more than the difference of their variances allows).
 PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge);
+
+/// The same, from the window around a frame. A start value that was far off had the bell near its window's border: then
+/// once more, with the bell in the middle.
+/// \param window_around  gives the PixelWindow around a frame
+template <class WindowAround>
+PixelTime time_by_likelihood_around(int frame, const WindowAround& window_around, const PixelJudge& judge) {
+  const PixelTime time = time_by_likelihood(window_around(frame), judge);
+  if (std::abs(time.bell_time - frame) <= 0.25 * judge.profile.full_width_half_maximum() + 1) return time;
+  const double within = std::clamp(time.bell_time, 0.0, judge.frame_count - 1.0);
+  return time_by_likelihood(window_around(static_cast<int>(std::lround(within))), judge);
+}
 
 /// What time_by_likelihood() says of a bell that was fitted as a plain one; nothing if it is not one, because its
 /// residuals are more than noise.

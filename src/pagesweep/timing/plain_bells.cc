@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "pagesweep/timing/plain_bells_internal.h"
 
@@ -14,19 +15,17 @@ PlainBells::PlainBells(const BellTables& tables, const SensorNoise& noise, doubl
   batch_.longest_step = static_cast<float>(0.3 * fwhm);
   batch_.read_variance = static_cast<float>(noise.read_variance);
   batch_.gain = static_cast<float>(noise.gain);
-  row_length_ = static_cast<std::size_t>(2 * batch_.middle + 1 + most_bells);
-  gray_.assign(row_length_ * most_bells, 0);
 }
 
-float* PlainBells::add(int centre, double log_width) {
+void PlainBells::add(int centre, double log_width, const float* gray, const float* present) {
   const auto i = static_cast<std::size_t>(batch_.count++);
   centre_[i] = centre;
   batch_.table[i] = &tables_.at(log_width);
   batch_.width_rest[i] = static_cast<float>(log_width) - batch_.table[i]->log_width;
-  batch_.gray[i] = &gray_[i * row_length_];
+  batch_.gray[i] = gray;
+  batch_.present[i] = present;
   batch_.time[i] = 0;
   batch_.good[i] = true;
-  return &gray_[i * row_length_];
 }
 
 void PlainBells::fit() {
@@ -34,15 +33,34 @@ void PlainBells::fit() {
   refine(batch_);
 }
 
+void PlainBells::fit_partial() {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(batch_.count); ++i) {
+    float low = std::numeric_limits<float>::infinity(), high = 0;
+    for (int k = 0; k <= 2 * reach(); ++k) {
+      if (batch_.present[i][k] == 0) continue;
+      low = std::min(low, batch_.gray[i][k]);
+      high = std::max(high, batch_.gray[i][k]);
+    }
+    batch_.background[i] = low;
+    batch_.amplitude[i] = std::max(high - low, 1.0F);
+    batch_.good[i] = std::isfinite(low);
+  }
+  refine(batch_);
+}
+
 PlainBells::Fit PlainBells::operator[](int k) const {
   const auto i = static_cast<std::size_t>(k);
+  const int reach = batch_.table[i]->reach,
+            first = batch_.middle + static_cast<int>(std::lround(batch_.time[i])) - reach;
+  const int samples =
+      static_cast<int>(std::count(batch_.present[i] + first, batch_.present[i] + first + 2 * reach + 1, 1.0F));
   return {batch_.good[i],
           static_cast<double>(centre_[i]) + static_cast<double>(batch_.time[i]),
           batch_.amplitude[i],
           batch_.background[i],
           batch_.sigma[i],
           std::max(0.0F, batch_.chi_square[i]),
-          2 * batch_.table[i]->reach + 1};
+          samples};
 }
 
 }  // namespace pagesweep

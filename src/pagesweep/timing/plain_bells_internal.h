@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <vector>
-
 #include "pagesweep/timing/bell_batch_internal.h"
 #include "pagesweep/timing/bell_tables_internal.h"
 #include "pagesweep/timing/sensor_noise.h"
@@ -38,18 +36,20 @@ class PlainBells {
 
   void clear() { batch_.count = 0; }
   bool is_full() const { return batch_.count == most_bells; }
-  /// Makes room for another pixel. \return where its samples at frames centre - reach() ... centre + reach() go
-  float* add(int centre, double log_width);
-  void drop_last() { --batch_.count; }
+  /// Another pixel. Both arrays must last until fit() and reach `most_bells` entries beyond the samples.
+  /// \param gray     samples of frames centre - reach() ... centre + reach(); any number where there is none
+  /// \param present  for each of them 1 if it is there, else 0
+  void add(int centre, double log_width, const float* gray, const float* present);
+  /// Bells whose samples are all there.
   void fit();
+  /// Bells of which some samples are missing.
+  void fit_partial();
   Fit operator[](int i) const;
 
  private:
   const BellTables& tables_;
   BellBatch batch_;
   BellBatch::Each<int> centre_{};
-  std::size_t row_length_;
-  std::vector<float> gray_;  ///< `most_bells` rows; what follows the samples is 0
 };
 
 }  // namespace pagesweep

@@ -29,18 +29,6 @@ void RowWindows::read(int y, int left, int columns) {
   search_.find(samples_, noise_, clipped);
 }
 
-bool RowWindows::copy(int x, int first, std::span<float> gray) const {
-  const float* sample = &samples_(x - left_, first);
-  const int stride = samples_.width();
-  float sum = 0;
-  for (float& value : gray) {
-    value = *sample;
-    sum += value;
-    sample += stride;
-  }
-  return std::isfinite(sum);
-}
-
 PixelWindow RowWindows::window_at(int x, double width, int centre) {
   const int reach = static_cast<int>(std::ceil(reach_ * width));
   const int begin = std::max(0, centre - reach), end = std::min(frames_.count(), centre + reach + 1);

@@ -35,8 +35,6 @@ class RowWindows {
   static double reach_around(const StripeProfile& profile);
   int frame(int x) const { return search_.frame(x - left_); }  ///< nearest to the stripe's middle
   int frame_count() const { return frames_.count(); }
-  /// The samples of frames first, first + 1, ... of a pixel. \return whether all are there and none is clipped
-  bool copy(int x, int first, std::span<float> gray) const;
 
  private:
   double start_amplitude(const PixelWindow& window, double width) const;
