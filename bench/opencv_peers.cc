@@ -87,26 +87,29 @@ bool has_peers() { return true; }
 
 void limit_peer_threads(int threads) { cv::setNumThreads(threads == 0 ? -1 : threads); }
 
-/// The code tells columns only. OpenCV averages all pixels that have a code, so each row is decoded by itself.
+/// The code tells columns only. OpenCV averages all pixels that have a code, so each row is decoded by itself; and it
+/// wants a code of the rows, which black and white give: that of row 0.
 std::int64_t decode_gray_code(const StereoFrames& frames) {
   const Rectification rectification(frames.first_camera, frames.second_camera);
-  const int patterns = frames.first.count() - 2;  // white and black are the last two
+  const int count = frames.first.count();
   Pictures first, second;
-  for (int i = 0; i < frames.first.count(); ++i) {
+  for (int i = 0; i < count; ++i) {
     first.push_back(rectification.first(picture_of(frames.first, i)));
     second.push_back(rectification.second(picture_of(frames.second, i)));
   }
+  // White and black change places: a dark pattern, then its inverse.
+  const auto dark = static_cast<std::size_t>(count - 2), lit = static_cast<std::size_t>(count - 1);
+  std::swap(first[dark], first[lit]), std::swap(second[dark], second[lit]);
   cv::structured_light::GrayCodePattern::Params size;
-  size.width = 1 << (patterns / 2);
-  size.height = 1;
+  size.width = 1 << (dark / 2);
+  size.height = 2;
   const auto code = cv::structured_light::GrayCodePattern::create(size);
   cv::Mat disparity(first[0].size(), CV_32F);
   parallel_rows(disparity.rows, [&](int y) {
-    Pictures row1 = rows_of(first, y), row2 = rows_of(second, y);
-    const Pictures black = {row1.back(), row2.back()}, white = {row1[row1.size() - 2], row2[row2.size() - 2]};
-    row1.resize(static_cast<std::size_t>(patterns)), row2.resize(static_cast<std::size_t>(patterns));
+    const std::vector<Pictures> rows = {rows_of(first, y), rows_of(second, y)};
+    const Pictures black = {rows[0][dark], rows[1][dark]}, white = {rows[0][lit], rows[1][lit]};
     cv::Mat shift;  // second minus first
-    code->decode(std::vector<Pictures>{row1, row2}, shift, black, white, cv::structured_light::DECODE_3D_UNDERWORLD);
+    code->decode(rows, shift, black, white, cv::structured_light::DECODE_3D_UNDERWORLD);
     cv::Mat out = disparity.row(y);
     shift.convertTo(out, CV_32F, -1);
   });
