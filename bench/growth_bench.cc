@@ -30,25 +30,23 @@ std::vector<RayTable> rays_of(const SyntheticScene& scene) {
 double pixels_of(int side_px) { return 2.0 * side_px * side_px; }
 
 void grow_pixels(const Settings& settings, Report& report) {
-  constexpr std::array<int, 4> sides = {256, 416, 640, 1024};
-  std::array<double, 4> pixels{};
+  constexpr std::array<int, 4> sides = {256, 416, 640, 1024}, sides_for_sequences = {128, 192, 288, 432};
+  std::array<double, 4> pixels{}, pixels_for_sequences{};
   std::array<Way, 4> times, points, sequences;
-  std::vector<SyntheticScene> scenes;
   std::vector<SyntheticFrames> sweeps;
-  std::vector<std::vector<Frames>> waves;
   std::vector<Timing> timings;
-  std::vector<std::vector<RayTable>> rays;
-  for (const int side : sides) {
-    scenes.push_back(make_scene(side));
-    rays.push_back(rays_of(scenes.back()));
-    sweeps.push_back(sweep_over(scenes.back(), {.count = 100}));
-    timings.push_back(estimate_times(sweeps.back().frames));
-    waves.push_back(project_waves(scenes.back(), 12));
-  }
+  std::vector<std::vector<Frames>> waves;
+  std::vector<std::vector<RayTable>> rays, rays_for_sequences;
   // The same depths for all sizes: found automatically, they would be those of what a larger picture sees besides.
   const MatchOptions depths{.near_mm = table_mm - 100, .far_mm = table_mm + 100};
   for (std::size_t k = 0; k < sides.size(); ++k) {
-    pixels[k] = pixels_of(sides[k]);
+    const SyntheticScene scene = make_scene(sides[k]), small_scene = make_scene(sides_for_sequences[k]);
+    pixels[k] = pixels_of(sides[k]), pixels_for_sequences[k] = pixels_of(sides_for_sequences[k]);
+    sweeps.push_back(sweep_over(scene, {.count = 100}));
+    timings.push_back(estimate_times(sweeps[k].frames));
+    waves.push_back(project_waves(small_scene, 12));
+    rays.push_back(rays_of(scene));
+    rays_for_sequences.push_back(rays_of(small_scene));
     times[k].run = [&, k] { estimate_times(sweeps[k].frames); };
     points[k].run = [&, k] {
       const auto& maps = timings[k].maps;
@@ -56,11 +54,13 @@ void grow_pixels(const Settings& settings, Report& report) {
       triangulate(matches.from_first, maps[0].amplitude, rays[k][0], rays[k][1]);
       triangulate(matches.from_second, maps[1].amplitude, rays[k][1], rays[k][0]);
     };
-    sequences[k].run = [&, k] { match_sequences(waves[k][0], waves[k][1], rays[k][0], rays[k][1], depths); };
+    sequences[k].run = [&, k] {
+      match_sequences(waves[k][0], waves[k][1], rays_for_sequences[k][0], rays_for_sequences[k][1], depths);
+    };
   }
   measure("time values over pixels", pixels, times, settings, report);
   measure("time matching and triangulation over pixels", pixels, points, settings, report);
-  measure("sequence matching over pixels", pixels, sequences, settings, report);
+  measure("sequence matching over pixels", pixels_for_sequences, sequences, settings, report);
 }
 
 void grow_frames(const Settings& settings, Report& report) {
@@ -86,7 +86,7 @@ void grow_frames(const Settings& settings, Report& report) {
 void grow_depths(const Settings& settings, Report& report) {
   constexpr std::array<double, 4> ranges_mm = {50, 100, 200, 400};
   std::array<Way, 4> times, sequences;
-  const SyntheticScene scene = make_scene(1024), small_scene = make_scene(384);
+  const SyntheticScene scene = make_scene(1024), small_scene = make_scene(256);
   const std::vector<RayTable> rays = rays_of(scene), small_rays = rays_of(small_scene);
   const SyntheticFrames sweep = sweep_over(scene, {.count = 100});
   const Timing timing = estimate_times(sweep.frames);
