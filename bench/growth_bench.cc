@@ -27,18 +27,23 @@ std::vector<RayTable> rays_of(const SyntheticScene& scene) {
   return {scene.rig.cameras.begin(), scene.rig.cameras.end()};
 }
 
+/// Given, and not found automatically: these are the same for pictures of all sizes. A millimetre is 2 px of an
+/// epipolar curve: in no picture it leaves before its end, which would make the small ones easier than the large ones.
+MatchOptions depths_around_table(double range_mm) {
+  return {.near_mm = table_mm - range_mm / 2, .far_mm = table_mm + range_mm / 2};
+}
+
 double pixels_of(int side_px) { return 2.0 * side_px * side_px; }
 
 void grow_pixels(const Settings& settings, Report& report) {
-  constexpr std::array<int, 4> sides = {256, 416, 640, 1024}, sides_for_sequences = {128, 192, 288, 432};
+  constexpr std::array<int, 4> sides = {256, 416, 640, 1024}, sides_for_sequences = {192, 256, 384, 576};
   std::array<double, 4> pixels{}, pixels_for_sequences{};
   std::array<Way, 4> times, points, sequences;
   std::vector<SyntheticFrames> sweeps;
   std::vector<Timing> timings;
   std::vector<std::vector<Frames>> waves;
   std::vector<std::vector<RayTable>> rays, rays_for_sequences;
-  // The same depths for all sizes: found automatically, they would be those of what a larger picture sees besides.
-  const MatchOptions depths{.near_mm = table_mm - 100, .far_mm = table_mm + 100};
+  const MatchOptions depths = depths_around_table(40);
   for (std::size_t k = 0; k < sides.size(); ++k) {
     const SyntheticScene scene = make_scene(sides[k]), small_scene = make_scene(sides_for_sequences[k]);
     pixels[k] = pixels_of(sides[k]), pixels_for_sequences[k] = pixels_of(sides_for_sequences[k]);
@@ -70,7 +75,7 @@ void grow_frames(const Settings& settings, Report& report) {
   const std::vector<RayTable> small_rays = rays_of(small_scene);
   std::vector<SyntheticFrames> sweeps;
   std::vector<std::vector<Frames>> waves;
-  const MatchOptions depths{.near_mm = table_mm - 50, .far_mm = table_mm + 50};
+  const MatchOptions depths = depths_around_table(40);
   for (std::size_t k = 0; k < 4; ++k) {
     sweeps.push_back(sweep_over(scene, {.count = static_cast<int>(for_times[k])}));
     waves.push_back(project_waves(small_scene, static_cast<int>(for_sequences[k])));
@@ -84,15 +89,15 @@ void grow_frames(const Settings& settings, Report& report) {
 }
 
 void grow_depths(const Settings& settings, Report& report) {
-  constexpr std::array<double, 4> ranges_mm = {50, 100, 200, 400};
+  constexpr std::array<double, 4> ranges_mm = {10, 20, 40, 80};
   std::array<Way, 4> times, sequences;
-  const SyntheticScene scene = make_scene(1024), small_scene = make_scene(256);
+  const SyntheticScene scene = make_scene(1024), small_scene = make_scene(384);
   const std::vector<RayTable> rays = rays_of(scene), small_rays = rays_of(small_scene);
   const SyntheticFrames sweep = sweep_over(scene, {.count = 100});
   const Timing timing = estimate_times(sweep.frames);
   const std::vector<Frames> waves = project_waves(small_scene, 12);
   for (std::size_t k = 0; k < 4; ++k) {
-    const MatchOptions depths{.near_mm = table_mm - ranges_mm[k] / 2, .far_mm = table_mm + ranges_mm[k] / 2};
+    const MatchOptions depths = depths_around_table(ranges_mm[k]);
     times[k].run = [&, depths] {
       match_times(timing.maps[0], timing.maps[1], scene.rig.cameras[0], scene.rig.cameras[1], depths);
     };
