@@ -78,26 +78,32 @@ struct NormalEquations {
 };
 
 NormalEquations add_up(const std::vector<Row>& rows, int n) {
+  // A row concerns four neighbouring splines of either profile: a small block, which is added up in place.
+  struct Block {
+    Eigen::Matrix<double, 8, 8> a = Eigen::Matrix<double, 8, 8>::Zero();
+    Eigen::Matrix<double, 8, 1> b = Eigen::Matrix<double, 8, 1>::Zero();
+  };
+  std::vector<Block> blocks(static_cast<std::size_t>(n - 3));
   NormalEquations sums{Eigen::MatrixXd::Zero(2 * n, 2 * n), Eigen::VectorXd::Zero(2 * n), 0};
   for (const Row& row : rows) {
     const double w = row.weight * row.robust * row.cosine * row.cosine;
-    const double low = 1 - row.tau, high = row.tau;
-    for (int i = 0; i < 4; ++i) {
-      const int at = row.splines.first + i;
-      const double wi = w * row.splines.value[static_cast<std::size_t>(i)];
-      sums.b(at) += low * wi * row.z;
-      sums.b(n + at) += high * wi * row.z;
-      for (int j = 0; j < 4; ++j) {
-        const int to = row.splines.first + j;
-        const double wij = wi * row.splines.value[static_cast<std::size_t>(j)];
-        sums.a(to, at) += low * low * wij;
-        sums.a(n + to, at) += high * low * wij;
-        sums.a(n + to, n + at) += high * high * wij;
-      }
-    }
+    const Eigen::Map<const Eigen::Vector4d> splines(row.splines.value.data());
+    Eigen::Matrix<double, 8, 1> x;
+    x << (1 - row.tau) * splines, row.tau * splines;
+    const Eigen::Matrix<double, 8, 1> weighted = w * x;
+    Block& block = blocks[static_cast<std::size_t>(row.splines.first)];
+    block.a.noalias() += weighted * x.transpose();
+    block.b += row.z * weighted;
     sums.z_squared += w * row.z * row.z;
   }
-  sums.a.topRightCorner(n, n) = sums.a.bottomLeftCorner(n, n).transpose();
+  for (int first = 0; first + 3 < n; ++first) {
+    const Block& block = blocks[static_cast<std::size_t>(first)];
+    for (const int half : {0, 1}) {
+      sums.b.segment<4>(half * n + first) += block.b.segment<4>(4 * half);
+      for (const int other : {0, 1})
+        sums.a.block<4, 4>(half * n + first, other * n + first) += block.a.block<4, 4>(4 * half, 4 * other);
+    }
+  }
   return sums;
 }
 

@@ -16,8 +16,8 @@ namespace pagesweep::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-/// Sixteen at most: what Window::pad() leaves room for.
-using Tag = hn::CappedTag<float, 16>;
+/// A neighbourhood has some hundred cells: with longer vectors the sums over their lanes would weigh too much.
+using Tag = hn::CappedTag<float, 8>;
 using Vec = hn::Vec<Tag>;
 
 /// (1, u, v, uu, uv, vv) of the cells from k on.
@@ -75,13 +75,12 @@ void FindResiduals(const std::array<float, 6>& coefficients, Window& window) {
 
 double MedianResidual(const Window& window) {
   const Tag d;
-  Vec largest = hn::Zero(d);
-  for (std::size_t k = 0; k < window.size; k += hn::Lanes(d))
-    largest = hn::Max(largest, hn::LoadU(d, &window.residual[k]));
-  // Where half of them are larger: by halving the interval, which costs less than moving them about.
-  float low = 0, high = hn::GetLane(hn::MaxOfLanes(d, largest));
-  const auto above = static_cast<float>(window.size - window.size / 2 - 1);
-  for (int halving = 0; halving < 20; ++halving) {
+  Vec sum = hn::Zero(d);
+  for (std::size_t k = 0; k < window.size; k += hn::Lanes(d)) sum = hn::Add(sum, hn::LoadU(d, &window.residual[k]));
+  // By halving an interval, which costs less than moving them about. No median exceeds two means.
+  float low = 0, high = static_cast<float>(2 * total(d, sum) / static_cast<double>(window.size));
+  const auto above = static_cast<float>(window.size - window.size / 2 - 1);  // so many of them are larger
+  for (int halving = 0; halving < 12; ++halving) {
     const float middle = 0.5f * (low + high);
     const Vec threshold = hn::Set(d, middle);
     Vec count = hn::Zero(d);

@@ -24,7 +24,7 @@ struct Window {
   void pad();
 
  private:
-  static constexpr std::size_t slack = 16;
+  static constexpr std::size_t slack = 8;
 };
 
 /// The normal equations sum_i w_i x_i x_i' c = sum_i w_i z_i x_i with rows x = (1, u, v, uu, uv, vv) and
@@ -40,7 +40,7 @@ WindowSums add_up(const Window& window);
 /// \param coefficients  of (1, u, v, uu, uv, vv)
 void find_residuals(const std::array<float, 6>& coefficients, Window& window);
 
-/// Median of window.residual, to a millionth of the largest one.
+/// Median of window.residual, to a two-thousandth of their mean.
 double median_residual(const Window& window);
 
 /// Puts weights by residual / unit into window.robust: Tukey's biweight, or those of least absolute values beyond 1.
