@@ -19,34 +19,21 @@ BSplineRow CubicBSplines::inside(double x) const {
   const auto above = std::upper_bound(breaks_.begin() + 1, breaks_.end() - 1, x);
   const auto first = static_cast<std::size_t>(above - breaks_.begin() - 1);
   const double* t = knots_.data() + first;  // x lies in [t[3], t[4])
-  // Cox-de Boor: order[k][j] is the spline of degree k that begins at t[3 - k + j].
-  std::array<std::array<double, 4>, 4> order{};
-  order[0][0] = 1;
-  for (int k = 1; k < 4; ++k)
-    for (int j = 0; j <= k; ++j) {
-      const auto n = static_cast<std::size_t>(k), m = static_cast<std::size_t>(j);
-      const double* s = t + 3 - k + j;
-      if (j > 0) order[n][m] += (x - s[0]) / (s[k] - s[0]) * order[n - 1][m - 1];
-      if (j < k) order[n][m] += (s[k + 1] - x) / (s[k + 1] - s[1]) * order[n - 1][m];
-    }
-  // The derivative of a spline of degree k is a difference of two of degree k - 1.
-  const auto derivative = [&](int k, int j, const auto& lower) {
-    const double* s = t + 3 - k + j;
-    const double rise = j > 0 ? lower(j - 1) / (s[k] - s[0]) : 0;
-    const double fall = j < k ? lower(j) / (s[k + 1] - s[1]) : 0;
-    return k * (rise - fall);
-  };
-  const auto linear = [&](int j) { return order[1][static_cast<std::size_t>(j)]; };
-  const auto quadratic = [&](int j) { return order[2][static_cast<std::size_t>(j)]; };
-  const auto quadratic_slope = [&](int j) { return derivative(2, j, linear); };
+  // Cox-de Boor: the splines of degree 1, 2 and 3 that are not zero at x, each a mixture of two of the degree below.
+  const double w1 = 1 / (t[4] - t[3]);
+  const double linear[2] = {w1 * (t[4] - x), w1 * (x - t[3])};
+  const double w2[2] = {linear[0] / (t[4] - t[2]), linear[1] / (t[5] - t[3])};
+  const double quadratic[3] = {w2[0] * (t[4] - x), w2[0] * (x - t[2]) + w2[1] * (t[5] - x), w2[1] * (x - t[3])};
+  const double r3[3] = {1 / (t[4] - t[1]), 1 / (t[5] - t[2]), 1 / (t[6] - t[3])};
+  const double w3[3] = {r3[0] * quadratic[0], r3[1] * quadratic[1], r3[2] * quadratic[2]};
+  // The derivative of a spline of degree k is k times a difference of two of degree k - 1, over their widths.
+  const double d3[3] = {r3[0] * -2 * w2[0], r3[1] * 2 * (w2[0] - w2[1]), r3[2] * 2 * w2[1]};
   BSplineRow row;
   row.first = static_cast<int>(first);
-  for (int j = 0; j < 4; ++j) {
-    const auto m = static_cast<std::size_t>(j);
-    row.value[m] = order[3][m];
-    row.slope[m] = derivative(3, j, quadratic);
-    row.curvature[m] = derivative(3, j, quadratic_slope);
-  }
+  row.value = {w3[0] * (t[4] - x), w3[0] * (x - t[1]) + w3[1] * (t[5] - x), w3[1] * (x - t[2]) + w3[2] * (t[6] - x),
+               w3[2] * (x - t[3])};
+  row.slope = {-3 * w3[0], 3 * (w3[0] - w3[1]), 3 * (w3[1] - w3[2]), 3 * w3[2]};
+  row.curvature = {-3 * d3[0], 3 * (d3[0] - d3[1]), 3 * (d3[1] - d3[2]), 3 * d3[2]};
   return row;
 }
 
