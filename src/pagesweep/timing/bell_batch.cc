@@ -167,9 +167,9 @@ void weigh(const BellBatch& batch, Equations& equations) {
 
 void Refine(BellBatch& batch) {
   constexpr int most_steps = 12;
-  constexpr float small = 0.1f;  // of sigma: the next step would be a hundredth of that
+  constexpr float small = 0.02f;  // change of the amplitude that changes no weight
   Equations e;
-  Each moved{};
+  BellBatch::Each<bool> arrived{};
   bool is_done = false;
   for (int step = 0; step < most_steps && !is_done; ++step) {
     weigh(batch, e);
@@ -183,7 +183,7 @@ void Refine(BellBatch& batch) {
       const float amplitude = (aa * e.rp[i] + ab * e.r1[i] + as * e.rs[i]) / determinant;
       const float background = (ab * e.rp[i] + bb * e.r1[i] + bs * e.rs[i]) / determinant;
       const float slope = (as * e.rp[i] + bs * e.r1[i] + ss * e.rs[i]) / determinant;
-      const float time = moved[i] = std::clamp(-slope / batch.amplitude[i], -batch.longest_step, batch.longest_step);
+      const float time = std::clamp(-slope / batch.amplitude[i], -batch.longest_step, batch.longest_step);
       batch.sigma[i] = std::sqrt(ss / determinant) / batch.amplitude[i];
       batch.chi_square[i] = e.rr[i] - (amplitude * e.rp[i] + background * e.r1[i] + slope * e.rs[i]);
       batch.good[i] = batch.good[i] && determinant > 0;
@@ -192,12 +192,15 @@ void Refine(BellBatch& batch) {
       batch.background[i] += background;
       batch.time[i] += time;
       batch.good[i] = std::abs(batch.time[i]) <= batch.most_moved;
-      if (batch.good[i] && !(std::abs(time) < small * batch.sigma[i])) is_done = false;
-      if (!batch.good[i]) batch.time[i] = 0;
+      // What a step leaves is its square over the stripe's width.
+      arrived[i] = time * time < batch.curvature * batch.sigma[i] && std::abs(amplitude) < small * batch.amplitude[i];
+      if (batch.good[i] && !arrived[i]) is_done = false;
+      if (batch.good[i]) continue;
+      batch.left_to[i] = batch.time[i];
+      batch.time[i] = 0;
     }
   }
-  for (std::size_t i = 0; i < static_cast<std::size_t>(batch.count); ++i)
-    batch.good[i] = batch.good[i] && std::abs(moved[i]) < small * batch.sigma[i];
+  for (std::size_t i = 0; i < static_cast<std::size_t>(batch.count); ++i) batch.good[i] = batch.good[i] && arrived[i];
 }
 
 }  // namespace pagesweep::HWY_NAMESPACE

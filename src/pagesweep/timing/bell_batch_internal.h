@@ -19,6 +19,7 @@ struct BellBatch {
   float most_moved = 0;    ///< [frames] from there: farther away samples are missing
   float near = 0;          ///< [frames] from the true time: small against the stripe's width
   float longest_step = 0;  ///< [frames]
+  float curvature = 0;     ///< [frames] a step whose square is below this times sigma leaves little of sigma
   float read_variance = 1, gain = 0;
 
   Each<const BellTable*> table{};
@@ -28,6 +29,7 @@ struct BellBatch {
 
   alignas(64) Each<float> time{}, amplitude{}, background{}, sigma{}, chi_square{};
   Each<bool> good{};
+  Each<float> left_to{};  ///< of a bell that is not good: where it left for, 0 if nowhere
 };
 
 /// Least squares steps with even weights until all good bells are near; what goes astray is good no longer.

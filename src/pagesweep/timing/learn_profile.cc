@@ -27,7 +27,7 @@ struct Pupil {
   std::uint64_t rank = 0;  ///< random, fixed by the pixel's place
 };
 
-constexpr int rows_looked_at = 96, columns_looked_at = 512;  // of each camera: enough pixels for any subset
+constexpr int rows_looked_at = 64, columns_looked_at = 256;  // of each camera: enough pixels for any subset
 
 std::uint64_t mix(std::uint64_t z) {  // splitmix64's finaliser
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;

@@ -126,7 +126,12 @@ PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma
 }
 
 std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double width, const PixelJudge& judge) {
-  if (!fit.converged) return std::nullopt;
+  if (!fit.converged) {
+    // It rises towards an end of the recording and has its middle beyond.
+    if (fit.time < 0 || fit.time > judge.frame_count - 1)
+      return PixelTime{.amplitude = fit.amplitude, .bell_time = fit.time, .status = PixelStatus::truncated};
+    return std::nullopt;
+  }
   const double chi_square = fit.chi_square / std::max(1, fit.samples - 3), limit = noise_limit(fit.samples);
   if (judge.refuse_misfits && chi_square > limit) return std::nullopt;
   const Bell bell{fit.amplitude, fit.background, fit.time, width};

@@ -12,6 +12,7 @@ PlainBells::PlainBells(const BellTables& tables, const SensorNoise& noise, doubl
   batch_.middle = tables.longest_reach() + margin;
   batch_.most_moved = static_cast<float>(margin);
   batch_.near = static_cast<float>(0.05 * fwhm);
+  batch_.curvature = static_cast<float>(0.01 * fwhm);
   batch_.longest_step = static_cast<float>(0.3 * fwhm);
   batch_.read_variance = static_cast<float>(noise.read_variance);
   batch_.gain = static_cast<float>(noise.gain);
@@ -26,6 +27,7 @@ void PlainBells::add(int centre, double log_width, const float* gray, const floa
   batch_.present[i] = present;
   batch_.time[i] = 0;
   batch_.good[i] = true;
+  batch_.left_to[i] = 0;
 }
 
 void PlainBells::fit() {
@@ -55,7 +57,7 @@ PlainBells::Fit PlainBells::operator[](int k) const {
   const int samples =
       static_cast<int>(std::count(batch_.present[i] + first, batch_.present[i] + first + 2 * reach + 1, 1.0F));
   return {batch_.good[i],
-          static_cast<double>(centre_[i]) + static_cast<double>(batch_.time[i]),
+          static_cast<double>(centre_[i]) + static_cast<double>(batch_.good[i] ? batch_.time[i] : batch_.left_to[i]),
           batch_.amplitude[i],
           batch_.background[i],
           batch_.sigma[i],

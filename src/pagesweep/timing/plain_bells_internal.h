@@ -18,8 +18,8 @@ namespace pagesweep {
 class PlainBells {
  public:
   struct Fit {
-    bool converged = false;  ///< if not, the pixel is not a plain case, and nothing else here holds
-    double time = 0;         ///< [frames]
+    bool converged = false;  ///< if not, the pixel is not a plain case, and nothing else here holds but
+    double time = 0;         ///< [frames] where the bell was last seen, far from where it was expected
     double amplitude = 0;    ///< [gray values]
     double background = 0;   ///< [gray values]
     double time_sigma = 0;   ///< [frames] from the noise alone

@@ -38,7 +38,7 @@ PlainRows::PlainRows(const Frames& frames, const BellTables& tables, const Strip
 void PlainRows::estimate(int y, int left, int columns, const std::function<void(int, const PixelTime&)>& put,
                          std::vector<int>& alone) {
   // Half a sigma less than a bell needs to be told from noise: between two blocks the response is that much lower.
-  constexpr double least_significance = 3;
+  constexpr double least_significance = 3, hardly_significant = 4;
   if (y != row_y_) row_ = raw_row(frames_, y, pad_);
   row_y_ = y;
   search_.find(row_, pad_, left, columns);
@@ -50,20 +50,21 @@ void PlainRows::estimate(int y, int left, int columns, const std::function<void(
       if (search_.significance(k) < least_significance)
         put(left + k, {});
       else
-        candidates_.push_back({left + k, search_.frame(k), log_widths_[static_cast<std::size_t>(k)]});
+        candidates_.push_back({left + k, search_.frame(k), log_widths_[static_cast<std::size_t>(k)],
+                               search_.significance(k) < hardly_significant});
     }
     if (!candidates_.empty()) estimate_tile(std::min(left + first, frames_.width() - tile_pixels), put, alone);
   }
 }
 
-int PlainRows::gather_in_time(std::vector<int>& alone) {
+int PlainRows::gather_in_time(const std::function<void(int, const PixelTime&)>& put) {
   const auto middle = candidates_.begin() + static_cast<std::ptrdiff_t>(candidates_.size() / 2);
   std::ranges::nth_element(candidates_, middle, {}, &Candidate::centre);
   const int spare = tile_frames_ - (2 * bells_.reach() + 1);
   const int first_centre = middle->centre - spare / 2;
   std::erase_if(candidates_, [&](const Candidate& candidate) {
     const bool is_far = candidate.centre < first_centre || candidate.centre > first_centre + spare;
-    if (is_far) alone.push_back(candidate.x);
+    if (is_far) put(candidate.x, look_closely(candidate));
     return is_far;
   });
   return first_centre - bells_.reach();
@@ -71,7 +72,7 @@ int PlainRows::gather_in_time(std::vector<int>& alone) {
 
 void PlainRows::estimate_tile(int tile_left, const std::function<void(int, const PixelTime&)>& put,
                               std::vector<int>& alone) {
-  const int first = gather_in_time(alone);
+  const int first = gather_in_time(put);
   const Sequence& sequence = frames_.sequence();
   std::array<float, tile_pixels> most;
   std::visit(
@@ -125,12 +126,15 @@ void PlainRows::fit(bool whole, int tile_left, int first, const std::function<vo
   for (std::size_t i = 0; i < fitted_.size(); ++i) {
     const Candidate& candidate = fitted_[i];
     auto time = time_of_plain_bell(bells_[static_cast<int>(i)], std::exp(candidate.log_width), judge_);
-    if (time && !whole) time->status = judge_partial(candidate, *time, gray_of(candidate));
-    if (!time)
-      time = time_by_likelihood_around(
-          candidate.centre, [&](int frame) { return window_around(candidate, frame); }, judge_);
-    put(candidate.x, *time);
+    if (time && time->status != PixelStatus::truncated && !whole)
+      time->status = judge_partial(candidate, *time, gray_of(candidate));
+    put(candidate.x, time ? *time : candidate.may_be_noise ? PixelTime{} : look_closely(candidate));
   }
+}
+
+PixelTime PlainRows::look_closely(const Candidate& candidate) {
+  return time_by_likelihood_around(
+      candidate.centre, [&](int frame) { return window_around(candidate, frame); }, judge_);
 }
 
 PixelWindow PlainRows::window_around(const Candidate& candidate, int frame) {

@@ -32,14 +32,16 @@ class PlainRows {
     int x;       ///< column
     int centre;  ///< [frames] of the bell, nearly
     double log_width;
+    bool may_be_noise;  ///< a bell at the limit of judge_bell(): if it cannot be fitted it is none
   };
 
   void estimate_tile(int tile_left, const std::function<void(int, const PixelTime&)>& put, std::vector<int>& alone);
-  /// Sets aside who is too far from the others in time to share a tile. \\return first frame of the tile
-  int gather_in_time(std::vector<int>& alone);
+  /// Looks closely at who is too far from the others in time to share a tile. \return first frame of the tile
+  int gather_in_time(const std::function<void(int, const PixelTime&)>& put);
   bool is_clipped(const Candidate& candidate, const float* gray) const;
   void fit(bool whole, int tile_left, int first, const std::function<void(int, const PixelTime&)>& put);
-  /// For a closer look at a pixel whose residuals are more than noise.
+  /// The likelihood fit of one pixel by itself.
+  PixelTime look_closely(const Candidate& candidate);
   PixelWindow window_around(const Candidate& candidate, int frame);
   bool is_whole(int centre) const;
   /// The verdict on a bell of which samples are missing.
