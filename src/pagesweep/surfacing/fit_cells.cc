@@ -21,9 +21,9 @@ struct Neighbour {
 /// The fits at the corners of the lattice square that holds cell (i, j).
 class Surroundings {
  public:
-  Surroundings(const Image<LocalFit>& lattice, double cell_mm, int i, int j) {
-    const int i0 = i / fit_pitch, j0 = j / fit_pitch;
-    const double a = double(i % fit_pitch) / fit_pitch, b = double(j % fit_pitch) / fit_pitch;
+  Surroundings(const Image<LocalFit>& lattice, int pitch, double cell_mm, int i, int j) {
+    const int i0 = i / pitch, j0 = j / pitch;
+    const double a = double(i % pitch) / pitch, b = double(j % pitch) / pitch;
     for (const int dj : {0, 1})
       for (const int di : {0, 1}) {
         const double share = (di ? a : 1 - a) * (dj ? b : 1 - b);
@@ -32,14 +32,15 @@ class Surroundings {
           complete_ = false;
           continue;
         }
-        const double u = (i - (i0 + di) * fit_pitch) * cell_mm, v = (j - (j0 + dj) * fit_pitch) * cell_mm;
+        const double u = (i - (i0 + di) * pitch) * cell_mm, v = (j - (j0 + dj) * pitch) * cell_mm;
         neighbours_[count_++] = {lattice(i0 + di, j0 + dj).moved(u, v), share};
       }
   }
 
   std::span<const Neighbour> all() const { return {neighbours_.data(), count_}; }
-  bool are_smooth() const {
-    return complete_ && std::ranges::none_of(all(), [](const Neighbour& n) { return n.fit.at_edge; });
+  bool are_smooth(double too_much) const {
+    return complete_ &&
+           std::ranges::all_of(all(), [&](const Neighbour& n) { return !n.fit.at_edge && n.fit.scatter < too_much; });
   }
   LocalFit blended() const {
     LocalFit sum;
@@ -70,7 +71,7 @@ double disagreement(const CellMean& cell, const LocalFit& fit) {
 
 /// What the lattice tells about a cell that holds points; not ok if that is not enough.
 LocalFit look_up(const Surroundings& surroundings, const CellMean& cell, const LocalFitOptions& options) {
-  if (surroundings.are_smooth()) return surroundings.blended();
+  if (surroundings.are_smooth(options.too_much)) return surroundings.blended();
   LocalFit best;
   if (!options.borrow) return best;
   double least = agreement_sigmas;
@@ -102,6 +103,22 @@ Image<LocalFit> fit_lattice(const Image<CellMean>& cells, double cell_mm, int pi
   return fits;
 }
 
+Image<LocalFit> refine_lattice(const Image<LocalFit>& coarse, const Image<CellMean>& cells, double cell_mm, int pitch,
+                               const LocalFitOptions& options) {
+  Image<LocalFit> fits((cells.width() - 1) / pitch + 1, (cells.height() - 1) / pitch + 1, LocalFit());
+  parallel_rows(fits.height(), [&](int j) {
+    LocalFitter fitter(cells, cell_mm);
+    for (int i = 0; i < fits.width(); ++i) {
+      const Surroundings surroundings(coarse, 2 * pitch, cell_mm, i * pitch, j * pitch);
+      fits(i, j) =
+          surroundings.are_smooth(options.too_much)
+              ? surroundings.blended()
+              : fitter.fit_along_edges(i * pitch, j * pitch, options.radius_mm, options.steps, options.too_much);
+    }
+  });
+  return fits;
+}
+
 Image<LocalFit> fit_cells(const Image<CellMean>& cells, double cell_mm, const LocalFitOptions& options,
                           const Image<std::uint8_t>& wanted) {
   const Image<LocalFit> lattice = fit_lattice(cells, cell_mm, fit_pitch, options);
@@ -110,7 +127,8 @@ Image<LocalFit> fit_cells(const Image<CellMean>& cells, double cell_mm, const Lo
     LocalFitter fitter(cells, cell_mm);
     for (int i = 0; i < fits.width(); ++i) {
       if (!wanted(i, j)) continue;
-      if (cells(i, j).weight > 0) fits(i, j) = look_up(Surroundings(lattice, cell_mm, i, j), cells(i, j), options);
+      if (cells(i, j).weight > 0)
+        fits(i, j) = look_up(Surroundings(lattice, fit_pitch, cell_mm, i, j), cells(i, j), options);
       if (!fits(i, j).ok) fits(i, j) = fitter.fit_along_edges(i, j, options.radius_mm, options.steps, options.too_much);
     }
   });

@@ -223,14 +223,6 @@ PageSurface FlatPage::empty_page(double spacing_mm) const {
   return page;
 }
 
-PageSurface FlatPage::sample_model(double spacing_mm) const {
-  PageSurface page = empty_page(spacing_mm);
-  for_each_node(page, [&](int i, int j, const Eigen::Vector2d& node) {
-    page.model(i, j) = surface_point(node.x(), node.y()).cast<float>();
-  });
-  return page;
-}
-
 PageSurface FlatPage::sample(const PlanFrame& frame) const {
   PageSurface page = empty_page(spacing_mm_);
   page.measured = page.model;
@@ -273,24 +265,32 @@ void FlatPage::look_up_status(const Eigen::Vector3d& measured, double normal_z, 
   sigma = differences_.sigma(i, j) * static_cast<float>(normal_z);
 }
 
-/// Largest error of the interpolated model in the middle of cells, a sample of them, the gutter's among them.
-/// \param page  in plan coordinates
-double FlatPage::interpolation_error(const PageSurface& page) const {
+/// Largest error of the interpolated model in the middle of cells, a sample of their rows, the gutter's among them.
+double FlatPage::interpolation_error(double spacing_mm) const {
+  const PageSurface page = empty_page(spacing_mm);
   double largest = 0;
-  const Eigen::Vector2d middle(0.5 * (columns_ - 1), 0.5 * (rows_ - 1));
-  for (int j = 1; j + 2 < page.rows(); j += std::max(1, page.rows() / 8))
+  for (int j = 1; j + 2 < page.rows(); j += std::max(1, page.rows() / 8)) {
+    PageSurface strip;  // the four rows of nodes that have a say in the middle of a cell
+    strip.spacing_mm = spacing_mm;
+    strip.s0_mm = page.s0_mm;
+    strip.t0_mm = page.t_of(j - 1);
+    strip.model = Image<Eigen::Vector3f>(page.columns(), 4, Eigen::Vector3f::Zero());
+    for_each_node(strip, [&](int i, int k, const Eigen::Vector2d& node) {
+      strip.model(i, k) = surface_point(node.x(), node.y()).cast<float>();
+    });
+    Eigen::Vector2d node(0.5 * (columns_ - 1), 0.5 * (rows_ - 1));
     for (int i = 0; i + 1 < page.columns(); ++i) {
-      const double s = page.s_of(i + 0.5), t = page.t_of(j + 0.5);
-      const Eigen::Vector2d node = node_at({s, t}, middle);
-      largest = std::max(largest, (interpolate(page, page.model, s, t) - surface_point(node.x(), node.y())).norm());
+      const double s = strip.s_of(i + 0.5), t = strip.t_of(1.5);
+      node = node_at({s, t}, node);
+      largest = std::max(largest, (interpolate(strip, strip.model, s, t) - surface_point(node.x(), node.y())).norm());
     }
+  }
   return largest;
 }
 
 double FlatPage::fine_enough_spacing() const {
   double spacing = coarsest_spacing_mm;
-  while (0.75 * spacing > finest_spacing_mm && interpolation_error(sample_model(spacing)) > interpolation_error_mm)
-    spacing *= 0.75;
+  while (0.75 * spacing > finest_spacing_mm && interpolation_error(spacing) > interpolation_error_mm) spacing *= 0.75;
   return spacing;
 }
 

@@ -57,9 +57,8 @@ class FlatPage {
   Eigen::Vector2d node_at(const Eigen::Vector2d& paper, Eigen::Vector2d guess) const;
   template <class Use>
   void for_each_node(const PageSurface& page, const Use& use) const;
-  PageSurface empty_page(double spacing_mm) const;
-  PageSurface sample_model(double spacing_mm) const;  // in plan coordinates, `model` alone
-  double interpolation_error(const PageSurface& page) const;
+  PageSurface empty_page(double spacing_mm) const;  // its model has its size
+  double interpolation_error(double spacing_mm) const;
   double fine_enough_spacing() const;
   bool is_measured(const Eigen::Vector3d& point) const;
   void look_up_status(const Eigen::Vector3d& measured, double normal_z, float& sigma, PixelStatus& status) const;

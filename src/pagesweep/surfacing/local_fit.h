@@ -80,6 +80,10 @@ struct LocalFitOptions {
 /// Fits to the cells (i * pitch, j * pitch).
 Image<LocalFit> fit_lattice(const Image<CellMean>& cells, double cell_mm, int pitch, const LocalFitOptions& options);
 
+/// The same from a lattice of twice the pitch: blended where the surface is smooth, fitted elsewhere.
+Image<LocalFit> refine_lattice(const Image<LocalFit>& coarse, const Image<CellMean>& cells, double cell_mm, int pitch,
+                               const LocalFitOptions& options);
+
 /// A fit at each cell. Most come from a lattice of every third cell of either axis, much finer than a neighbourhood:
 /// where all is smooth, the surrounding fits are blended; other cells are fitted one by one. At an edge that takes ten
 /// windows; if one may `borrow`, a cell takes the one of the surrounding fits that its own points agree with best.

@@ -201,23 +201,17 @@ Image<CellMean> median_points(const HeightField& field) {
 
 /// Robust fits to the median points, every few cells, and the noise they show.
 Image<LocalFit> first_fits(const Image<CellMean>& medians, HeightField& field, double radius_mm) {
-  constexpr int steps = 4;
-  Image<LocalFit> fits =
-      fit_lattice(medians, field.cell_mm, first_pass_step, {radius_mm, steps, std::numeric_limits<double>::infinity()});
+  LocalFitOptions options{radius_mm, 4, std::numeric_limits<double>::infinity()};
+  const Image<LocalFit> coarse = fit_lattice(medians, field.cell_mm, 2 * first_pass_step, options);
   std::vector<double> scatters;
-  for (const LocalFit& fit : fits.pixels())
+  for (const LocalFit& fit : coarse.pixels())
     if (fit.ok) scatters.push_back(fit.scatter);
-  if (scatters.empty()) return fits;
-  std::ranges::nth_element(scatters, scatters.begin() + static_cast<std::ptrdiff_t>(scatters.size() / 2));
-  field.noise_factor = std::max(0.1, scatters[scatters.size() / 2]);
-  const double too_much = edge_scatter * std::max(1.0, field.noise_factor);
-  parallel_rows(fits.height(), [&](int j) {
-    LocalFitter fitter(medians, field.cell_mm);
-    for (int i = 0; i < fits.width(); ++i)
-      if (fits(i, j).ok && fits(i, j).scatter > too_much)
-        fits(i, j) = fitter.fit_along_edges(i * first_pass_step, j * first_pass_step, radius_mm, steps, too_much);
-  });
-  return fits;
+  if (!scatters.empty()) {
+    std::ranges::nth_element(scatters, scatters.begin() + static_cast<std::ptrdiff_t>(scatters.size() / 2));
+    field.noise_factor = std::max(0.1, scatters[scatters.size() / 2]);
+  }
+  options.too_much = edge_scatter * std::max(1.0, field.noise_factor);
+  return refine_lattice(coarse, medians, field.cell_mm, first_pass_step, options);
 }
 
 /// Whether a point agrees with one of the first fits around it. At an edge of the surface those on its own side do.
