@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <hwy/targets.h>
+#include <vector>
+
+#include "pagesweep/timing/bell_fit.h"
+#include "pagesweep/timing/plain_bells_internal.h"
+#include "pagesweep/timing/row_windows_internal.h"
+#include "pagesweep/timing/stripe_pixel_testing.h"
+
+namespace pagesweep {
+namespace {
+
+/// A skewed stripe: what is symmetric hides errors of sign.
+StripeProfile make_profile() {
+  const auto shape = testing::skewed(2.5, 5);
+  std::vector<StripeProfile::Point> points;
+  for (double t = -25; t <= 25; t += 0.1) points.push_back({t, shape(t)});
+  return StripeProfile::fit(points, -25, 25, 0.5);
+}
+
+/// Samples of `most_bells` noisy pixels, and the fits of both ways.
+class PlainBellsTest : public ::testing::Test {
+ protected:
+  static constexpr int count = 160;
+  const StripeProfile profile = make_profile();
+  const SensorNoise noise{.read_variance = 1.5, .gain = 0.03};
+  const double reach = RowWindows::reach_around(profile);
+  const BellTables tables{profile, reach, {0.9, 1.15}};
+  PlainBells bells{tables, noise, profile.full_width_half_maximum()};
+  std::vector<std::vector<float>> gray;
+  std::vector<float> present;
+  std::vector<Bell> truth;
+
+  /// \param middle  [frames] about where the bells are
+  void make(double middle, int missing_every = 0) {
+    present.assign(3 * count, 0.0F);  // frame i is entry count + i
+    for (int i = 0; i < count; ++i)
+      present[static_cast<std::size_t>(count + i)] = missing_every > 0 && i % missing_every == 0 ? 0.0F : 1.0F;
+    for (int p = 0; p < most_bells; ++p) {
+      truth.push_back({20.0 + 12 * p, 3.0 + p, middle + 0.37 * p - 3, 0.92 + 0.013 * p});
+      std::vector<float> samples(3 * count, 0.0F);
+      for (int i = 0; i < count; ++i) {
+        const double light = truth.back().gray_at(i, profile);
+        const auto place = static_cast<std::uint64_t>(1000 * p + i);
+        const double scatter = std::sqrt(noise.variance(light)) * testing::normal(11, place);
+        samples[static_cast<std::size_t>(count + i)] = static_cast<float>(light + scatter);
+      }
+      gray.push_back(samples);
+    }
+  }
+  int expected(int p) const { return static_cast<int>(std::lround(truth[static_cast<std::size_t>(p)].time + 0.9)); }
+
+  void fit(bool partial) {
+    bells.clear();
+    for (int p = 0; p < most_bells; ++p) {
+      const auto first = static_cast<std::size_t>(count + expected(p) - bells.reach());
+      bells.add(expected(p), std::log(truth[static_cast<std::size_t>(p)].width), &gray[static_cast<std::size_t>(p)][first],
+                &present[first]);
+    }
+    partial ? bells.fit_partial() : bells.fit();
+  }
+
+  /// The scalar way, over the samples that the vectors' last step saw.
+  BellFit fit_alone(int p) const {
+    const auto& samples = gray[static_cast<std::size_t>(p)];
+    const Bell& bell = truth[static_cast<std::size_t>(p)];
+    const int begin = static_cast<int>(std::lround(bells[p].time)) - tables.at(std::log(bell.width)).reach;
+    const int end = 2 * static_cast<int>(std::lround(bells[p].time)) - begin;
+    std::vector<float> window;
+    for (int i = begin; i <= end; ++i) {
+      const auto k = static_cast<std::size_t>(count + i);
+      window.push_back(present[k] > 0 ? samples[k] : std::numeric_limits<float>::quiet_NaN());
+    }
+    return fit_bell(window, begin, profile, noise, bell);
+  }
+
+  void expect_agreement() const {
+    for (int p = 0; p < most_bells; ++p) {
+      SCOPED_TRACE(p);
+      const PlainBells::Fit fast = bells[p];
+      const BellFit slow = fit_alone(p);
+      ASSERT_TRUE(fast.converged);
+      ASSERT_TRUE(slow.converged);
+      EXPECT_NEAR(fast.time, slow.bell.time, 0.05 * slow.time_sigma());
+      EXPECT_NEAR(fast.time_sigma, slow.time_sigma(), 0.02 * slow.time_sigma());
+      EXPECT_NEAR(fast.amplitude, slow.bell.amplitude, 0.05 * std::sqrt(slow.covariance(0, 0)));
+      EXPECT_NEAR(fast.background, slow.bell.background, 0.05 * std::sqrt(slow.covariance(1, 1)));
+      EXPECT_NEAR(fast.chi_square, slow.chi_square, 0.02 * slow.chi_square);
+      EXPECT_EQ(fast.samples, slow.samples);
+    }
+  }
+};
+
+TEST_F(PlainBellsTest, AgreesWithTheScalarFitOnEveryInstructionSet) {
+  make(80);
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    fit(false);
+    expect_agreement();
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
+TEST_F(PlainBellsTest, AgreesWhereFramesWereDropped) {
+  make(80, 7);
+  fit(true);
+  expect_agreement();
+}
+
+TEST_F(PlainBellsTest, AgreesAtTheEndsOfTheRecording) {
+  for (const double middle : {12.0, count - 12.0}) {
+    gray.clear();
+    truth.clear();
+    make(middle);
+    fit(true);
+    expect_agreement();
+  }
+}
+
+TEST_F(PlainBellsTest, ABellThatIsElsewhereIsNoPlainCase) {
+  make(80);
+  bells.clear();
+  const auto first = static_cast<std::size_t>(count + 30 - bells.reach());
+  bells.add(30, 0, gray[15].data() + first, present.data() + first);  // 50 frames before it: nothing but noise
+  bells.fit();
+  EXPECT_TRUE(!bells[0].converged || bells[0].amplitude < 5 * std::sqrt(noise.read_variance));
+}
+
+}  // namespace
+}  // namespace pagesweep
