@@ -43,7 +43,7 @@ void grow_pixels(const Settings& settings, Report& report) {
   std::vector<Timing> timings;
   std::vector<std::vector<Frames>> waves;
   std::vector<std::vector<RayTable>> rays, rays_for_sequences;
-  const MatchOptions depths = depths_around_table(40);
+  const MatchOptions depths = depths_around_table(40), whole_page = depths_around_table(100);
   for (std::size_t k = 0; k < sides.size(); ++k) {
     const SyntheticScene scene = make_scene(sides[k]), small_scene = make_scene(sides_for_sequences[k]);
     pixels[k] = pixels_of(sides[k]), pixels_for_sequences[k] = pixels_of(sides_for_sequences[k]);
@@ -55,7 +55,7 @@ void grow_pixels(const Settings& settings, Report& report) {
     times[k].run = [&, k] { estimate_times(sweeps[k].frames); };
     points[k].run = [&, k] {
       const auto& maps = timings[k].maps;
-      const MatchPair matches = match_times(maps[0], maps[1], rays[k][0], rays[k][1], depths);
+      const MatchPair matches = match_times(maps[0], maps[1], rays[k][0], rays[k][1], whole_page);
       triangulate(matches.from_first, maps[0].amplitude, rays[k][0], rays[k][1]);
       triangulate(matches.from_second, maps[1].amplitude, rays[k][1], rays[k][0]);
     };
