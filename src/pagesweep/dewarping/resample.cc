@@ -116,9 +116,10 @@ class Resampler {
     const auto is_inside = [&](int k) {
       const int u = (lookups.u[k] >> phase_bits) + first_tap(taps_u);
       const int v = (lookups.v[k] >> phase_bits) + first_tap(taps_v);
-      // What is read beyond the end of a row is the next row, which the last one has not.
-      return u >= 0 && v >= 0 && u + taps_u <= width &&
-             (v + taps_v < scan_.height() || (v + taps_v == scan_.height() && u + taps_u + overread <= width));
+      // What is read beyond the last tap is the next row, or the one after, but must not lie beyond the picture.
+      const std::int64_t last = std::int64_t{v + taps_v - 1} * width + u + taps_u;
+      return u >= 0 && v >= 0 && u + taps_u <= width && v + taps_v <= scan_.height() &&
+             last + overread <= std::int64_t{width} * scan_.height();
     };
     for (int k = begin, next = begin; k < end; k = next) {
       const bool inside = is_inside(k);

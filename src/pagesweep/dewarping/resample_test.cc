@@ -241,6 +241,18 @@ TEST(Resample, DoesNotDependOnTheNumberOfThreads) {
   EXPECT_TRUE(same(many, resample(scan, map, 1)));
 }
 
+TEST(Resample, SmallScansAgreeWithThePlainLoop) {
+  // Vectors are longer than these rows, and kernels larger than some of the pictures.
+  for (int width = 1; width < 12; ++width)
+    for (const int height : {1, 5, 8})
+      for (const int channels : {1, 3}) {
+        const Picture scan = random_picture(width, height, channels, 8);
+        const ScanMap map = make_map(width + 2, height + 2, -0.7, -0.6, 0.9, 0, 0, 0.9);
+        EXPECT_LE(largest_difference(resample(scan, map, 1), resample_plainly(scan, map, 1)), 2)
+            << width << " x " << height;
+      }
+}
+
 TEST(Resample, RefusesAnEmptyScan) { EXPECT_THROW(resample(Picture{}, identity(3, 3), 1), std::invalid_argument); }
 
 }  // namespace
