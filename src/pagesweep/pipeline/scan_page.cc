@@ -83,6 +83,7 @@ std::vector<PointMap> section_each(const Stage& stage, const Measurement& measur
 void fuse(const MatchPair& matches, const Stage& stage, Measurement& measurement) {
   const auto& cameras = stage.cameras;
   const auto& times = measurement.timing->maps;
+  measurement.fusion.clear();
   measurement.sweep = calibrate_light(measurement.points, times);
   if (!measurement.sweep) return;
   const Light& light = measurement.sweep->light;
@@ -92,24 +93,22 @@ void fuse(const MatchPair& matches, const Stage& stage, Measurement& measurement
       fuse_light(measurement.points[1], matches.from_second, times[1], cameras[1], cameras[0], light, options)};
 }
 
-/// Points from the time maps; from the frames, for the sequence matcher.
+/// Points from the time maps; from the frames, for the sequence matcher. They have no normals yet.
 void find_points(const Stage& stage, Measurement& measurement, Progress& progress) {
   if (stage.options.matcher == Matcher::light_section) {
     measurement.points = section_each(stage, measurement);
-  } else {
-    const MatchPair matches = match(stage, measurement, progress);
-    progress.begin("triangulating");
-    measurement.points = triangulate_both(matches, stage, measurement);
-    if (stage.options.fusion && measurement.timing) fuse(matches, stage, measurement);
+    return;
   }
-  for (std::size_t c = 0; c < stage.cameras.size(); ++c)
-    fit_normals(measurement.points[c], stage.cameras[c], stage.options.triangulation.normal_radius_px);
+  const MatchPair matches = match(stage, measurement, progress);
+  progress.begin("triangulating");
+  measurement.points = triangulate_both(matches, stage, measurement);
+  if (stage.options.fusion && measurement.timing) fuse(matches, stage, measurement);
 }
 
-/// Points that are good enough to look up what is printed there.
-std::vector<PointMap> find_rough_points(const Stage& stage, const Measurement& measurement, Progress& progress) {
-  if (stage.options.matcher == Matcher::light_section) return section_each(stage, measurement);
-  return triangulate_both(match(stage, measurement, progress), stage, measurement);
+/// Normals, and without the points that stand alone.
+void finish_points(const Stage& stage, Measurement& measurement) {
+  for (std::size_t c = 0; c < stage.cameras.size(); ++c)
+    fit_normals(measurement.points[c], stage.cameras[c], stage.options.triangulation.normal_radius_px);
 }
 
 /// Each camera's times, moved to the pixels' centres by what its own amplitudes tell of the print.
@@ -124,12 +123,12 @@ void correct_by_amplitude(const std::vector<TimeMap>& seen, Measurement& measure
 
 /// Likewise by what the scan tells, where the first measurement can look it up, and only if it explains the times
 /// better: a scan that does not lie where the rig says is no witness.
-void correct_by_scan(const std::vector<TimeMap>& seen, const std::vector<PointMap>& points, const Scanner& scanner,
-                     const Picture& scan, Measurement& measurement) {
+void correct_by_scan(const std::vector<TimeMap>& seen, const Scanner& scanner, const Picture& scan,
+                     Measurement& measurement) {
   for (std::size_t c = 0; c < seen.size(); ++c) {
     const double spot_variance_px2 = measurement.edges[c].gain;
     if (!(spot_variance_px2 > 0)) continue;
-    const SpotOffsets offsets = weigh_footprints(points[c], scanner, scan, spot_variance_px2);
+    const SpotOffsets offsets = weigh_footprints(measurement.points[c], scanner, scan, spot_variance_px2);
     const auto comparisons = compare_with_surroundings(seen[c], offsets);
     const EdgeCorrection correction = fit_edges(seen[c], comparisons);
     if (!(correction.after < measurement.edges[c].after)) continue;
@@ -162,7 +161,7 @@ Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& 
                         const Picture* scan) {
   Measurement measurement;
   measurement.cameras = cameras_of(source, rig, options.matcher);
-  const std::vector<Frames> frames = read_all(source, progress);
+  std::vector<Frames> frames = read_all(source, progress);
   for (const Frames& sequence : frames) {
     measurement.dropped_frames.push_back(sequence.dropped());
     measurement.clipped_frames.push_back(count_clipped(sequence));
@@ -170,20 +169,24 @@ Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& 
   const Stage stage{rig, options, frames, {measurement.cameras.begin(), measurement.cameras.end()}};
   if (options.matcher == Matcher::sequence) {
     find_points(stage, measurement, progress);
+    finish_points(stage, measurement);
     return measurement;
   }
   measurement.timing = estimate_times(frames, options.timing, progress);
+  // They are most of what is in memory, and only this estimator needs them again.
+  if (options.timing.estimator != TimeEstimator::pairwise) frames.clear();
   const std::vector<TimeMap> seen = measurement.timing->maps;
   if (options.edges != EdgeWitness::none) {
     progress.begin("looking for print");
     correct_by_amplitude(seen, measurement);
   }
   if (options.edges == EdgeWitness::scan && scan && rig.scanner) {
-    const std::vector<PointMap> rough = find_rough_points(stage, measurement, progress);
+    find_points(stage, measurement, progress);
     progress.begin("looking up the print in the scan");
-    correct_by_scan(seen, rough, *rig.scanner, *scan, measurement);
+    correct_by_scan(seen, *rig.scanner, *scan, measurement);
   }
   find_points(stage, measurement, progress);
+  finish_points(stage, measurement);
   return measurement;
 }
 
