@@ -36,7 +36,6 @@ class BellTables {
   /// The nearest one.
   const BellTable& at(double log_width) const;
   int longest_reach() const { return tables_.back().reach; }
-  int longest() const { return tables_.back().length; }
 
  private:
   double first_log_width_;

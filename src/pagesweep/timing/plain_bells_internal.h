@@ -35,7 +35,6 @@ class PlainBells {
   int reach() const { return batch_.middle; }
 
   void clear() { batch_.count = 0; }
-  bool is_full() const { return batch_.count == most_bells; }
   /// Another pixel. Both arrays must last until fit() and reach `most_bells` entries beyond the samples.
   /// \param gray     samples of frames centre - reach() ... centre + reach(); any number where there is none
   /// \param present  for each of them 1 if it is there, else 0

@@ -34,7 +34,6 @@ class RowWindows {
   /// [frames] to both sides of the stripe's middle, at width 1, that a window has.
   static double reach_around(const StripeProfile& profile);
   int frame(int x) const { return search_.frame(x - left_); }  ///< nearest to the stripe's middle
-  int frame_count() const { return frames_.count(); }
 
  private:
   double start_amplitude(const PixelWindow& window, double width) const;
