@@ -41,6 +41,8 @@ void Frames::set(int i, GrayImage image) {
   if (i < 0 || i >= count()) throw std::invalid_argument("Frames::set: no such frame");
   if (width_of(image) != width() || height_of(image) != height())
     throw std::invalid_argument("Frames::set: the frame's size is not the sequence's");
+  if (std::holds_alternative<Image<std::uint8_t>>(image) != sequence_.is_8_bit())
+    throw std::invalid_argument("Frames::set: the frame's depth is not the sequence's");
   images_[static_cast<std::size_t>(i)] = std::move(image);
 }
 
@@ -51,7 +53,7 @@ bool Frames::read_row(int y, Image<float>& samples) const {
 
 bool Frames::read_row(int y, int left, Image<float>& samples) const {
   bool clipped = false;
-  for (int i = 0; i < count(); ++i) {
+  for (int i = 0; i < samples.height(); ++i) {
     const auto out = samples.row(i);
     if (!has(i)) {
       std::fill(out.begin(), out.end(), std::numeric_limits<float>::quiet_NaN());

@@ -31,6 +31,7 @@ struct Sequence {
   /// Exposure of each frame relative to the longest one: above 0, at most 1. Empty: all alike.
   std::vector<double> exposures = {};
 
+  bool is_8_bit() const { return bit_depth <= 8; }  ///< else its frames have 16 bit samples
   double exposure(int i) const { return exposures.empty() ? 1 : exposures[static_cast<std::size_t>(i)]; }
 };
 
@@ -52,8 +53,10 @@ class Frames {
   int count() const { return sequence_.count; }
   bool has(int i) const { return images_[static_cast<std::size_t>(i)].has_value(); }
   int dropped() const;
-  /// \throws std::invalid_argument  if i is out of range or the size is not the sequence's
+  /// \throws std::invalid_argument  if i is out of range, or size or depth are not the sequence's
   void set(int i, GrayImage image);
+  /// Gives a frame's memory back: it counts as dropped from now on.
+  void forget(int i) { images_[static_cast<std::size_t>(i)].reset(); }
   const GrayImage& frame(int i) const { return *images_[static_cast<std::size_t>(i)]; }
 
   /// The gray value sequences of a row of pixels, black level removed and divided by the frame's relative exposure:
@@ -63,8 +66,9 @@ class Frames {
   /// \param samples  becomes count() rows of width() pixels
   /// \return whether a sample is clipped
   bool read_row(int y, Image<float>& samples) const;
-  /// The same for the pixels (left, y), (left + 1, y), ..., as many as `samples` has columns.
-  /// \param samples  of count() rows; must fit into the row
+  /// The same for the pixels (left, y), (left + 1, y), ..., as many as `samples` has columns, and the first frames, as
+  /// many as it has rows.
+  /// \pre samples fit into the row and the frames
   bool read_row(int y, int left, Image<float>& samples) const;
 
  private:

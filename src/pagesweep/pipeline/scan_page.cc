@@ -11,6 +11,7 @@
 #include "pagesweep/footprint/weigh_footprints.h"
 #include "pagesweep/matching/match_sequences.h"
 #include "pagesweep/timing/pairwise.h"
+#include "pagesweep/timing/time_stream.h"
 #include "pagesweep/triangulation/normals.h"
 #include "pagesweep/triangulation/section_light.h"
 
@@ -155,26 +156,56 @@ double reading_direction(const Scanner& scanner) {
   return rightward ? std::atan2(along_row.y(), along_row.x()) : std::atan2(-along_row.y(), -along_row.x());
 }
 
+/// Whether points need whole sequences, and not only time values.
+bool needs_frames(const ScanOptions& options) {
+  return options.matcher == Matcher::sequence || options.timing.estimator == TimeEstimator::pairwise;
+}
+
+/// All frames first, then what is measured from them.
+std::vector<Frames> read_frames(FrameSource& source, const ScanOptions& options, Measurement& measurement,
+                                Progress& progress) {
+  std::vector<Frames> frames = read_all(source, progress);
+  for (const Frames& sequence : frames) {
+    measurement.dropped_frames.push_back(sequence.dropped());
+    measurement.clipped_frames.push_back(count_clipped(sequence));
+  }
+  if (options.matcher != Matcher::sequence) measurement.timing = estimate_times(frames, options.timing, progress);
+  return frames;
+}
+
+/// Time values while the frames come in; of the frames nothing is kept.
+void follow_frames(FrameSource& source, const ScanOptions& options, Measurement& measurement, Progress& progress) {
+  TimeStream times(source.sequences(), options.timing);
+  progress.begin("time values while the frames come in");
+  while (auto set = source.next()) {
+    const double part = (set->index + 1.0) / source.sequences()[0].count;
+    times.add(*std::move(set));
+    progress.advance(part);
+  }
+  measurement.timing = times.finish(progress);
+  for (std::size_t c = 0; c < source.sequences().size(); ++c) {
+    measurement.dropped_frames.push_back(times.dropped_frames(c));
+    measurement.clipped_frames.push_back(times.clipped_frames(c));
+  }
+}
+
 }  // namespace
 
 Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& options, Progress& progress,
                         const Picture* scan) {
   Measurement measurement;
   measurement.cameras = cameras_of(source, rig, options.matcher);
-  std::vector<Frames> frames = read_all(source, progress);
-  for (const Frames& sequence : frames) {
-    measurement.dropped_frames.push_back(sequence.dropped());
-    measurement.clipped_frames.push_back(count_clipped(sequence));
-  }
+  std::vector<Frames> frames;
+  if (needs_frames(options))
+    frames = read_frames(source, options, measurement, progress);
+  else
+    follow_frames(source, options, measurement, progress);
   const Stage stage{rig, options, frames, {measurement.cameras.begin(), measurement.cameras.end()}};
-  if (options.matcher == Matcher::sequence) {
+  if (!measurement.timing) {
     find_points(stage, measurement, progress);
     finish_points(stage, measurement);
     return measurement;
   }
-  measurement.timing = estimate_times(frames, options.timing, progress);
-  // They are most of what is in memory, and only this estimator needs them again.
-  if (options.timing.estimator != TimeEstimator::pairwise) frames.clear();
   const std::vector<TimeMap> seen = measurement.timing->maps;
   if (options.edges != EdgeWitness::none) {
     progress.begin("looking for print");

@@ -6,12 +6,15 @@
 #include <cmath>
 #include <cstddef>
 
+#include "pagesweep/base/parallel.h"
 #include "pagesweep/timing/bell_batch_internal.h"
+#include "pagesweep/timing/stripe_width.h"
 
 namespace pagesweep {
 namespace {
 
 constexpr double step = 0.01;  // of log width
+const int steps_to_widest = static_cast<int>(std::ceil(std::log(widest_stripe) / step));
 
 /// Least squares for gray = amplitude value + background + x slope, all samples alike: a row of weights an unknown.
 Eigen::MatrixXf solution_weights(const float* value, const float* slope, int count) {
@@ -53,16 +56,24 @@ BellTable make_table(const StripeProfile& profile, double reach, double log_widt
 
 }  // namespace
 
-BellTables::BellTables(const StripeProfile& profile, double reach, std::pair<double, double> widths)
-    : first_log_width_(step * std::floor(std::log(widths.first) / step)) {
-  const int last = static_cast<int>(std::ceil((std::log(widths.second) - first_log_width_) / step));
-  for (int i = 0; i <= std::max(0, last); ++i)
-    tables_.push_back(make_table(profile, reach, first_log_width_ + i * step));
+BellTables::BellTables(const StripeProfile& profile, double reach)
+    : profile_(profile), reach_(reach), tables_(2 * steps_to_widest + 1) {}
+
+std::size_t BellTables::index_of(double log_width) {
+  const auto steps = static_cast<int>(std::lround(log_width / step));
+  return static_cast<std::size_t>(std::clamp(steps, -steps_to_widest, steps_to_widest) + steps_to_widest);
 }
 
-const BellTable& BellTables::at(double log_width) const {
-  const auto last = static_cast<double>(tables_.size() - 1);
-  return tables_[static_cast<std::size_t>(std::clamp((log_width - first_log_width_) / step + 0.5, 0.0, last))];
+void BellTables::cover(std::pair<double, double> widths) {
+  const std::size_t first = index_of(std::log(widths.first)), last = index_of(std::log(widths.second));
+  parallel_rows(static_cast<int>(last - first + 1), [&](int i) {
+    const std::size_t k = first + static_cast<std::size_t>(i);
+    if (tables_[k]) return;
+    const double log_width = (static_cast<int>(k) - steps_to_widest) * step;
+    tables_[k] = std::make_unique<const BellTable>(make_table(profile_, reach_, log_width));
+  });
 }
+
+int BellTables::longest_reach() const { return static_cast<int>(std::ceil(reach_ * std::exp(steps_to_widest * step))); }
 
 }  // namespace pagesweep

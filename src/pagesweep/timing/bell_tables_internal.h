@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -25,21 +27,26 @@ struct BellTable {
   std::vector<float> inside;                                             ///< [length] 1 for samples within reach
 };
 
-/// Tables for all stripe widths of a camera, a percent apart. What lies between two rows is reached by the slope:
-/// an error below 1e-4 of the amplitude.
+/// Tables for all stripe widths, a percent apart. What lies between two rows is reached by the slope: an error below
+/// 1e-4 of the amplitude.
 class BellTables {
  public:
-  /// \param reach   [frames] to both sides of the middle at width 1: how much of a pixel's samples is to be used
-  /// \param widths  narrowest and widest stripe, relative to the profile
-  BellTables(const StripeProfile& profile, double reach, std::pair<double, double> widths);
+  /// \param reach  [frames] to both sides of the middle at width 1: how much of a pixel's samples is to be used
+  BellTables(const StripeProfile& profile, double reach);
 
-  /// The nearest one.
-  const BellTable& at(double log_width) const;
-  int longest_reach() const { return tables_.back().reach; }
+  /// Makes the tables for these widths, narrowest and widest, relative to the profile.
+  void cover(std::pair<double, double> widths);
+  /// The nearest one. \pre the width is covered
+  const BellTable& at(double log_width) const { return *tables_[index_of(log_width)]; }
+  /// [frames] that any table reaches to both sides.
+  int longest_reach() const;
 
  private:
-  double first_log_width_;
-  std::vector<BellTable> tables_;
+  static std::size_t index_of(double log_width);
+
+  const StripeProfile& profile_;
+  double reach_;
+  std::vector<std::unique_ptr<const BellTable>> tables_;
 };
 
 }  // namespace pagesweep

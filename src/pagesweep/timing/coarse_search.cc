@@ -7,60 +7,78 @@
 #include <limits>
 #include <span>
 
+#include "pagesweep/data/time_map.h"
 #include "pagesweep/timing/row_kernels_internal.h"
 
 namespace pagesweep {
 namespace {
 
 constexpr int longest_block = 256;  // [frames] whose sum of bytes fits into 16 bit
+// Place k lies between blocks k and k + 1; its response also takes blocks k - 3, k - 2 and k + 3, k + 4.
+constexpr int blocks_before = 3, blocks_after = 4;
 
 }  // namespace
 
-CoarseSearch::CoarseSearch(int frame_count, double fwhm, double read_variance)
-    : frame_count_(frame_count),
-      block_(std::clamp(static_cast<int>(std::lround(0.5 * fwhm)), 1, longest_block)),
+CoarseSearch::CoarseSearch(int width, int height, double fwhm, double read_variance)
+    : block_(std::clamp(static_cast<int>(std::lround(0.5 * fwhm)), 1, longest_block)),
       // The response counts the middle's 2 blocks twice; the sides add half of the middle's variance.
-      per_sigma_(1 / (4.0 * block_ * std::sqrt(1.5 * read_variance / (2 * block_)))) {}
+      per_sigma_(static_cast<float>(1 / (4.0 * block_ * std::sqrt(1.5 * read_variance / (2 * block_))))),
+      rise_(width, height, -std::numeric_limits<float>::infinity()),
+      before_(width, height, not_a_number),
+      after_(width, height, not_a_number),
+      last_(width, height, not_a_number),
+      best_(width, height, -1) {}
+
+CoarseSearch::Step CoarseSearch::next_step(int done, int frame_count, bool ended) const {
+  Step step;
+  step.frame_count = frame_count;
+  step.ended = ended;
+  step.end_block = ended ? (frame_count + block_ - 1) / block_ : frame_count / block_;
+  step.first_place = done;
+  step.end_place = std::max(done, ended ? step.end_block - 1 : step.end_block - blocks_after);
+  step.first_block = std::max(0, done - blocks_before);
+  return step;
+}
 
 template <class T>
-void CoarseSearch::sum_blocks(const RowsOf<T>& rows, int pad, int left) {
-  for (int k = 0; k < sums_.height(); ++k) {
-    const int begin = k * block_, count = std::min(block_, frame_count_ - begin);
-    const auto frames = std::span(rows).subspan(static_cast<std::size_t>(pad + begin), static_cast<std::size_t>(count));
-    sum_rows(frames, left, static_cast<float>(block_) / static_cast<float>(count), sums_.row(k));
+void CoarseSearch::sum_blocks(const Step& step, const RowsOf<T>& rows, int first_frame, int left,
+                              Image<float>& sums) const {
+  for (int k = step.first_block; k < step.end_block; ++k) {
+    const int begin = k * block_, count = std::min(block_, step.frame_count - begin);
+    const auto frames =
+        std::span(rows).subspan(static_cast<std::size_t>(begin - first_frame), static_cast<std::size_t>(count));
+    // A block that the recording's end has cut counts as a whole one.
+    sum_rows(frames, left, static_cast<float>(block_) / static_cast<float>(count), sums.row(k - step.first_block));
   }
 }
 
-void CoarseSearch::find(const RawRow& row, int pad, int left, int columns) {
-  const int blocks = (frame_count_ + block_ - 1) / block_, places = std::max(0, blocks - 1);
-  if (sums_.width() != columns) {
-    sums_ = Image<float>(columns, blocks);
-    responses_ = Image<float>(columns, places);
-  }
-  std::visit([&](const auto& rows) { sum_blocks(rows, pad, left); }, row);
-  rise_.assign(static_cast<std::size_t>(columns), -std::numeric_limits<float>::infinity());
-  best_.assign(static_cast<std::size_t>(columns), 0);
-  for (int k = 0; k < places; ++k) {
-    const bool has_left = k >= 3, has_right = k + 4 < blocks;
+void CoarseSearch::look(const Step& step, const RawRow& rows, int first_frame, int y, int left, int columns,
+                        Image<float>& sums) {
+  if (step.first_place == step.end_place) return;
+  const int blocks = step.end_block - step.first_block;
+  if (sums.width() != columns || sums.height() < blocks) sums = Image<float>(columns, blocks);
+  std::visit([&](const auto& present) { sum_blocks(step, present, first_frame, left, sums); }, rows);
+  const auto at = static_cast<std::size_t>(left);
+  const HighestRow highest{&rise_.row(y)[at], &before_.row(y)[at], &after_.row(y)[at], &last_.row(y)[at],
+                           &best_.row(y)[at]};
+  for (int k = step.first_place; k < step.end_place; ++k) {
+    const bool has_left = k >= blocks_before, has_right = k + blocks_after < step.end_block;
     if (!has_left && !has_right) continue;
     // Where one side is missing, the other stands for both.
     const int left_side = has_left ? k - 3 : k + 3, right_side = has_right ? k + 3 : k - 3;
-    const auto block = [&](int i) { return sums_.row(i).data(); };
+    const auto block = [&](int i) { return sums.row(i - step.first_block).data(); };
     keep_highest(
         {{block(k), block(k + 1)}, {block(left_side), block(left_side + 1), block(right_side), block(right_side + 1)}},
-        k, responses_.row(k), rise_, best_);
+        k, highest, static_cast<std::size_t>(columns));
   }
 }
 
-int CoarseSearch::frame(int x) const {
-  const int k = best_[static_cast<std::size_t>(x)];
-  double place = (k + 1) * block_ - 0.5;
-  if (k > 0 && k + 1 < responses_.height()) {
-    const double before = responses_(x, k - 1), here = responses_(x, k), after = responses_(x, k + 1);
-    const double bend = before - 2 * here + after;
-    if (bend < 0) place += block_ * std::clamp(0.5 * (before - after) / bend, -0.5, 0.5);
-  }
-  return static_cast<int>(std::lround(std::clamp(place, 0.0, frame_count_ - 1.0)));
+int CoarseSearch::frame(int x, int y, int frame_count) const {
+  double place = (best_(x, y) + 1) * block_ - 0.5;
+  const double before = before_(x, y), here = rise_(x, y), after = after_(x, y);
+  const double bend = before - 2 * here + after;
+  if (bend < 0) place += block_ * std::clamp(0.5 * (before - after) / bend, -0.5, 0.5);
+  return static_cast<int>(std::lround(std::clamp(place, 0.0, frame_count - 1.0)));
 }
 
 }  // namespace pagesweep

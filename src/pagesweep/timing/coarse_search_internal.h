@@ -2,42 +2,56 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "pagesweep/base/image.h"
 #include "pagesweep/timing/raw_row_internal.h"
 
 namespace pagesweep {
 
-/// Finds where, roughly, the stripe passes each pixel of a row: StripeSearch for frames of one exposure, in a fraction
-/// of its time. Frames are summed in blocks of half the stripe's length; the response is that of two blocks against
-/// two before and two after them, and a parabola through three responses tells the place between blocks.
+/// Finds where, roughly, the stripe passes each pixel, while the frames arrive: StripeSearch for frames of one
+/// exposure, in a fraction of its time. Frames are summed in blocks of half the stripe's length; the response at a
+/// place, between two blocks, is that of those two against two before and two after them, and a parabola through three
+/// responses tells the place between blocks.
 class CoarseSearch {
  public:
-  /// \param fwhm         full width of the stripe at half height [frames]
+  /// \param fwhm           full width of the stripe at half height [frames]
   /// \param read_variance  [gray values^2] of a sample without light
-  CoarseSearch(int frame_count, double fwhm, double read_variance);
+  CoarseSearch(int width, int height, double fwhm, double read_variance);
 
-  /// Looks at the pixels left, left + 1, ... of a row.
-  /// \param pad  entries of `row` before frame 0
-  void find(const RawRow& row, int pad, int left, int columns);
+  int block() const { return block_; }  ///< [frames]
 
-  /// Nearest to the bell's middle of pixel left + x.
-  int frame(int x) const;
-  /// How many standard deviations the response lies above what noise alone would give.
-  double significance(int x) const { return rise_[static_cast<std::size_t>(x)] * per_sigma_; }
+  /// What is looked at in one go: the places that frames before `end` allow and those before did not.
+  struct Step {
+    int first_place = 0, end_place = 0;
+    int first_block = 0, end_block = 0;  ///< whose sums take part
+    int frame_count = 0;                 ///< of the recording, if `ended`; else frames there are now
+    bool ended = false;                  ///< no more frames will come: beyond them, one side stands for both
+  };
+  /// \param done  places looked at already
+  Step next_step(int done, int frame_count, bool ended) const;
+  /// First frame that the step after `done` places needs.
+  int first_needed(int done) const { return std::max(0, done - 3) * block_; }
+
+  /// Looks at the pixels left, left + 1, ... of row y.
+  /// \param rows         frames from first_frame on
+  /// \param sums         scratch memory
+  void look(const Step& step, const RawRow& rows, int first_frame, int y, int left, int columns, Image<float>& sums);
+
+  /// Place of the highest response; -1 before the first.
+  int best(int x, int y) const { return best_(x, y); }
+  /// How many standard deviations it lies above what noise alone would give.
+  float significance(int x, int y) const { return rise_(x, y) * per_sigma_; }
+  /// Nearest to the bell's middle. \pre best(x, y) >= 0
+  int frame(int x, int y, int frame_count) const;
 
  private:
   template <class T>
-  void sum_blocks(const RowsOf<T>& rows, int pad, int left);
+  void sum_blocks(const Step& step, const RowsOf<T>& rows, int first_frame, int left, Image<float>& sums) const;
 
-  int frame_count_;
-  int block_;  ///< [frames]
-  double per_sigma_;
-  Image<float> sums_;       ///< a row a block
-  Image<float> responses_;  ///< row k: of blocks k and k + 1
-  std::vector<float> rise_;
-  std::vector<std::int32_t> best_;
+  int block_;
+  float per_sigma_;
+  Image<float> rise_, before_, after_, last_;
+  Image<std::int32_t> best_;
 };
 
 }  // namespace pagesweep

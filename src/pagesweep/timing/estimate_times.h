@@ -64,6 +64,6 @@ Timing estimate_times(std::span<const Frames> cameras, const TimingOptions& opti
 
 /// The time values of one camera when profile, noise and widths are known.
 TimeMap estimate_times(const Frames& frames, const StripeProfile& profile, const SensorNoise& noise,
-                       const StripeWidths& widths, const TimingOptions& options, Progress& progress = no_progress());
+                       const StripeWidths& widths, const TimingOptions& options);
 
 }  // namespace pagesweep

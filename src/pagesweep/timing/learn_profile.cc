@@ -27,6 +27,8 @@ struct Pupil {
   std::uint64_t rank = 0;  ///< random, fixed by the pixel's place
 };
 
+constexpr int first_lesson = 32;                             // [frames]
+constexpr double widest_reach = 3;                           // [fwhm] to both sides that is looked at
 constexpr int rows_looked_at = 64, columns_looked_at = 256;  // of each camera: enough pixels for any subset
 
 std::uint64_t mix(std::uint64_t z) {  // splitmix64's finaliser
@@ -100,19 +102,19 @@ std::vector<float> outline_of(std::vector<float> gray, const FrameNoise& noise) 
   return gray;
 }
 
-/// All pixels of a sparse grid over one camera that show a bell.
-std::vector<Pupil> find_pupils(const Frames& frames, const FrameNoise& noise, std::size_t camera) {
+/// All pixels of a sparse grid over one camera that show a bell in the frames before `end`.
+std::vector<Pupil> find_pupils(const Frames& frames, int end, const FrameNoise& noise, std::size_t camera) {
   const int row_step = std::max(1, frames.height() / rows_looked_at);
   const int column_step = std::max(1, frames.width() / columns_looked_at);
   const int rows = (frames.height() + row_step - 1) / row_step;
   std::vector<std::vector<Pupil>> found(static_cast<std::size_t>(rows));
   parallel_rows(rows, [&](int r) {
-    Image<float> samples;
-    frames.read_row(r * row_step, samples);
+    Image<float> samples(frames.width(), end);
+    frames.read_row(r * row_step, 0, samples);
     for (int x = 0; x < frames.width(); x += column_step) {
       Pupil pupil;
       pupil.camera = camera;
-      for (int i = 0; i < frames.count(); ++i) pupil.gray.push_back(samples(x, i));
+      for (int i = 0; i < end; ++i) pupil.gray.push_back(samples(x, i));
       const std::vector<float> outline = outline_of(pupil.gray, noise);
       pupil.rank = mix((static_cast<std::uint64_t>(r * row_step) << 32) + static_cast<std::uint64_t>(x) +
                        0x9E3779B97F4A7C15ULL * (camera + 1));
@@ -132,8 +134,15 @@ double typical_width(const std::vector<Pupil>& pupils) {
   return median(widths);
 }
 
-/// Keeps the best teachers of one camera: unclipped if there are enough, bright, of usual width, wholly recorded.
-std::vector<Pupil> select(std::vector<Pupil> pupils, std::size_t most, int frame_count) {
+/// Which frames there are to learn from.
+struct Lesson {
+  int end;       ///< [frames]
+  bool is_last;  ///< no more will come
+};
+
+/// Keeps the best teachers of one camera: unclipped if there are enough, bright, of usual width, wholly recorded: with
+/// all that the profile may reach, as long as waiting helps.
+std::vector<Pupil> select(std::vector<Pupil> pupils, std::size_t most, const Lesson& lesson) {
   constexpr std::size_t enough = 60;
   const auto unclipped = std::ranges::count_if(pupils, [](const Pupil& p) { return !p.clipped; });
   if (static_cast<std::size_t>(unclipped) >= std::min(enough, std::max<std::size_t>(1, pupils.size() / 4)))
@@ -145,13 +154,22 @@ std::vector<Pupil> select(std::vector<Pupil> pupils, std::size_t most, int frame
   std::nth_element(amplitudes.begin(), high, amplitudes.end());
   std::erase_if(pupils, [bright = 0.5 * *high](const Pupil& p) { return p.bell.amplitude < bright; });
   const double width = typical_width(pupils);
+  const double before = 1.5 * width, after = (lesson.is_last ? 1.5 : widest_reach) * width;
   std::erase_if(pupils, [&](const Pupil& p) {
-    const double margin = 1.5 * width;
-    return std::abs(p.fwhm - width) > 0.35 * width || p.middle < margin || p.middle > frame_count - 1 - margin;
+    return std::abs(p.fwhm - width) > 0.35 * width || p.middle < before || p.middle > lesson.end - 1 - after;
   });
   std::ranges::sort(pupils, {}, &Pupil::rank);
   if (pupils.size() > most) pupils.resize(most);
   return pupils;
+}
+
+/// Whether to wait for more would teach little: there are many, and of paper. What the stripe meets first may be a dark
+/// table, by whose light the stripe's shape is badly known.
+bool suffice(const std::vector<Pupil>& pupils, std::size_t most, double ceiling) {
+  if (pupils.size() < most / 4 + 1) return false;
+  std::vector<double> amplitudes;
+  for (const Pupil& pupil : pupils) amplitudes.push_back(pupil.bell.amplitude);
+  return median(amplitudes) > ceiling / 8;
 }
 
 /// Cuts a sequence to what surrounds the stripe.
@@ -176,7 +194,7 @@ class Teacher {
   Teacher(std::vector<Pupil> pupils, std::vector<FrameNoise> noise)
       : pupils_(std::move(pupils)), noise_(std::move(noise)) {
     fwhm_ = typical_width(pupils_);
-    reach_ = 2.5 * fwhm_;
+    reach_ = widest_reach / 1.2 * fwhm_;
     learned_.profile = raised_cosine(fwhm_);
     only_flanks_ = std::ranges::all_of(pupils_, [](const Pupil& p) { return p.clipped; });
     for (Pupil& pupil : pupils_) {
@@ -367,18 +385,31 @@ class Teacher {
 
 }  // namespace
 
-LearnedStripe learn_stripe(std::span<const Frames> cameras, int most_pixels) {
+std::optional<LearnedStripe> learn_stripe_early(std::span<const Frames> cameras, int end, int most_pixels) {
   std::vector<Pupil> pupils;
   std::vector<FrameNoise> noise;
+  const bool is_last = std::ranges::all_of(cameras, [end](const Frames& frames) { return end >= frames.count(); });
   const auto share = static_cast<std::size_t>(most_pixels) / std::max<std::size_t>(1, cameras.size());
   for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+    const Lesson lesson{std::min(end, cameras[camera].count()), is_last};
     const SensorNoise first_guess{.ceiling = ceiling_of(cameras[camera])};
     noise.emplace_back(first_guess, cameras[camera].sequence().exposures);
-    std::ranges::move(select(find_pupils(cameras[camera], noise.back(), camera), share, cameras[camera].count()),
-                      std::back_inserter(pupils));
+    std::vector<Pupil> own = select(find_pupils(cameras[camera], lesson.end, noise.back(), camera), share, lesson);
+    if (!is_last && !suffice(own, share, ceiling_of(cameras[camera]))) return std::nullopt;
+    std::ranges::move(own, std::back_inserter(pupils));
   }
   if (pupils.empty()) throw no_result("no stripe of light passes in the frames: no pixel rises and falls once");
   return Teacher(std::move(pupils), std::move(noise)).run();
+}
+
+int next_lesson(int end) { return end < first_lesson ? first_lesson : end + end / 4; }
+
+LearnedStripe learn_stripe(std::span<const Frames> cameras, int most_pixels) {
+  int count = 0;
+  for (const Frames& frames : cameras) count = std::max(count, frames.count());
+  for (int end = next_lesson(0); end < count; end = next_lesson(end))
+    if (auto learned = learn_stripe_early(cameras, end, most_pixels)) return *std::move(learned);
+  return *learn_stripe_early(cameras, count, most_pixels);
 }
 
 }  // namespace pagesweep

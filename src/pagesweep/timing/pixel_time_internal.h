@@ -5,9 +5,9 @@
 #include <cmath>
 #include <optional>
 
-#include "pagesweep/data/status.h"
+#include "pagesweep/data/time_map.h"
+#include "pagesweep/timing/pixel_window_internal.h"
 #include "pagesweep/timing/plain_bells_internal.h"
-#include "pagesweep/timing/row_windows_internal.h"
 
 namespace pagesweep {
 
@@ -21,6 +21,16 @@ struct PixelTime {
   double bell_time = 0;   ///< [frames] where the bell was found, whatever the status
   PixelStatus status = PixelStatus::too_dark;
 };
+
+/// Puts it into the map: time and sigma only if it is ok.
+inline void set_time(TimeMap& map, int x, int y, const PixelTime& time) {
+  const bool ok = time.status == PixelStatus::ok;
+  map.status(x, y) = time.status;
+  map.amplitude(x, y) = static_cast<float>(time.amplitude);
+  map.residual(x, y) = static_cast<float>(time.residual);
+  map.time(x, y) = ok ? static_cast<float>(time.time) : not_a_number;
+  map.sigma(x, y) = ok ? static_cast<float>(time.sigma) : not_a_number;
+}
 
 /// All that is the same for every pixel of a camera.
 struct PixelJudge {

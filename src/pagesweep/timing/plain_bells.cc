@@ -7,10 +7,10 @@
 
 namespace pagesweep {
 
-PlainBells::PlainBells(const BellTables& tables, const SensorNoise& noise, double fwhm) : tables_(tables) {
-  const int margin = static_cast<int>(std::ceil(0.25 * fwhm)) + 1;  // the search finds it nearer than that
-  batch_.middle = tables.longest_reach() + margin;
-  batch_.most_moved = static_cast<float>(margin);
+PlainBells::PlainBells(const BellTables& tables, const SensorNoise& noise, double fwhm)
+    : tables_(tables), margin_(static_cast<int>(std::ceil(0.25 * fwhm)) + 1) {  // the search finds it nearer than that
+  batch_.middle = tables.longest_reach() + margin_;
+  batch_.most_moved = static_cast<float>(margin_);
   batch_.near = static_cast<float>(0.05 * fwhm);
   batch_.curvature = static_cast<float>(0.01 * fwhm);
   batch_.longest_step = static_cast<float>(0.3 * fwhm);
@@ -38,7 +38,8 @@ void PlainBells::fit() {
 void PlainBells::fit_partial() {
   for (std::size_t i = 0; i < static_cast<std::size_t>(batch_.count); ++i) {
     float low = std::numeric_limits<float>::infinity(), high = 0;
-    for (int k = 0; k <= 2 * reach(); ++k) {
+    const int around = batch_.table[i]->reach + margin_;
+    for (int k = reach() - around; k <= reach() + around; ++k) {
       if (batch_.present[i][k] == 0) continue;
       low = std::min(low, batch_.gray[i][k]);
       high = std::max(high, batch_.gray[i][k]);

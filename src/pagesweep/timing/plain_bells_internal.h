@@ -31,8 +31,10 @@ class PlainBells {
   /// \param fwhm    of the stripe [frames]
   PlainBells(const BellTables& tables, const SensorNoise& noise, double fwhm);
 
-  /// How many samples before and after the expected middle frame are wanted.
+  /// How many samples before and after the expected middle frame every pixel must have.
   int reach() const { return batch_.middle; }
+  /// How many of them are looked at where the stripe is that wide.
+  int reach(double log_width) const { return tables_.at(log_width).reach + margin_; }
 
   void clear() { batch_.count = 0; }
   /// Another pixel. Both arrays must last until fit() and reach `most_bells` entries beyond the samples.
@@ -47,6 +49,7 @@ class PlainBells {
 
  private:
   const BellTables& tables_;
+  int margin_;  ///< [frames] the expected middle may be off
   BellBatch batch_;
   BellBatch::Each<int> centre_{};
 };

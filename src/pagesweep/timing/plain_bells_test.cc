@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <hwy/targets.h>
 #include <array>
 #include <cmath>
-#include <hwy/targets.h>
 #include <vector>
 
 #include "pagesweep/timing/bell_fit.h"
@@ -28,8 +28,8 @@ class PlainBellsTest : public ::testing::Test {
   static constexpr int count = 160;
   const StripeProfile profile = make_profile();
   const SensorNoise noise{.read_variance = 1.5, .gain = 0.03};
-  const double reach = RowWindows::reach_around(profile);
-  const BellTables tables{profile, reach, {0.9, 1.15}};
+  const double reach = reach_around(profile);
+  BellTables tables{profile, reach};
   PlainBells bells{tables, noise, profile.full_width_half_maximum()};
   std::vector<std::vector<float>> gray;
   std::vector<float> present;
@@ -37,6 +37,7 @@ class PlainBellsTest : public ::testing::Test {
 
   /// \param middle  [frames] about where the bells are
   void make(double middle, int missing_every = 0) {
+    tables.cover({0.9, 1.15});
     present.assign(3 * count, 0.0F);  // frame i is entry count + i
     for (int i = 0; i < count; ++i)
       present[static_cast<std::size_t>(count + i)] = missing_every > 0 && i % missing_every == 0 ? 0.0F : 1.0F;
@@ -58,8 +59,8 @@ class PlainBellsTest : public ::testing::Test {
     bells.clear();
     for (int p = 0; p < most_bells; ++p) {
       const auto first = static_cast<std::size_t>(count + expected(p) - bells.reach());
-      bells.add(expected(p), std::log(truth[static_cast<std::size_t>(p)].width), &gray[static_cast<std::size_t>(p)][first],
-                &present[first]);
+      bells.add(expected(p), std::log(truth[static_cast<std::size_t>(p)].width),
+                &gray[static_cast<std::size_t>(p)][first], &present[first]);
     }
     partial ? bells.fit_partial() : bells.fit();
   }

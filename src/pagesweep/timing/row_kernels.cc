@@ -2,6 +2,7 @@
 #include "pagesweep/timing/row_kernels_internal.h"
 
 #include <algorithm>
+#include <limits>
 #include <type_traits>
 
 // Not worth their time to compile beside SSE4, AVX2 and AVX-512.
@@ -43,40 +44,51 @@ void SumRows(Rows<T> rows, int left, float factor, std::span<float> sums) {
   }
 }
 
-void KeepHighest(const BlockRows& rows, std::int32_t index, std::span<float> responses, std::span<float> rise,
-                 std::span<std::int32_t> best) {
+void KeepHighest(const BlockRows& rows, std::int32_t place, const HighestRow& highest, std::size_t count) {
   const Floats d;
   const hn::RebindToSigned<Floats> integers;
   const auto& [middle, side] = rows;
   std::size_t x = 0;
-  for (; x + hn::Lanes(d) <= rise.size(); x += hn::Lanes(d)) {
+  for (; x + hn::Lanes(d) <= count; x += hn::Lanes(d)) {
     const auto at = [x](const float* row) { return hn::LoadU(Floats(), row + x); };
     const Vector sides = hn::Add(hn::Add(at(side[0]), at(side[1])), hn::Add(at(side[2]), at(side[3])));
     const Vector light = hn::Add(at(middle[0]), at(middle[1])), response = hn::Sub(hn::Add(light, light), sides);
-    const Vector before = at(rise.data());
-    const auto higher = hn::Gt(response, before);
-    hn::StoreU(response, d, &responses[x]);
-    hn::StoreU(hn::IfThenElse(higher, response, before), d, &rise[x]);
-    const auto bests = hn::LoadU(integers, &best[x]);
-    hn::StoreU(hn::IfThenElse(hn::RebindMask(integers, higher), hn::Set(integers, index), bests), integers, &best[x]);
+    const Vector rise = at(highest.rise), last = at(highest.last);
+    const auto bests = hn::LoadU(integers, highest.best + x);
+    const auto higher = hn::Gt(response, rise);
+    const auto follows = hn::RebindMask(d, hn::Eq(bests, hn::Set(integers, place - 1)));
+    const Vector after = hn::IfThenElse(follows, response, at(highest.after));
+    hn::StoreU(hn::IfThenElse(higher, response, rise), d, highest.rise + x);
+    hn::StoreU(hn::IfThenElse(higher, last, at(highest.before)), d, highest.before + x);
+    hn::StoreU(hn::IfThenElse(higher, hn::Set(d, std::numeric_limits<float>::quiet_NaN()), after), d,
+               highest.after + x);
+    hn::StoreU(response, d, highest.last + x);
+    hn::StoreU(hn::IfThenElse(hn::RebindMask(integers, higher), hn::Set(integers, place), bests), integers,
+               highest.best + x);
   }
-  for (; x < rise.size(); ++x) {
+  for (; x < count; ++x) {
     const float sides = (side[0][x] + side[1][x]) + (side[2][x] + side[3][x]), light = middle[0][x] + middle[1][x];
-    responses[x] = light + light - sides;
-    if (!(responses[x] > rise[x])) continue;
-    rise[x] = responses[x];
-    best[x] = index;
+    const float response = light + light - sides;
+    if (response > highest.rise[x]) {
+      highest.rise[x] = response;
+      highest.before[x] = highest.last[x];
+      highest.after[x] = std::numeric_limits<float>::quiet_NaN();
+      highest.best[x] = place;
+    } else if (highest.best[x] == place - 1) {
+      highest.after[x] = response;
+    }
+    highest.last[x] = response;
   }
 }
 
 /// As many vectors as they have lanes become the vectors of their first, second, ... lanes: each pass turns the
 /// address, vector number before lane number, by one bit.
-void transpose(Vector* vectors) {
+template <class D>
+void transpose(D d, hn::Vec<D>* vectors) {
 #if HWY_TARGET != HWY_SCALAR
-  const Floats d;
   const std::size_t lanes = hn::Lanes(d);
   for (std::size_t pass = 1; pass < lanes; pass *= 2) {
-    Vector turned[tile_pixels];
+    hn::Vec<D> turned[tile_pixels];
     for (std::size_t k = 0; k < lanes / 2; ++k) {
       turned[k] = hn::ConcatEven(d, vectors[2 * k + 1], vectors[2 * k]);
       turned[k + lanes / 2] = hn::ConcatOdd(d, vectors[2 * k + 1], vectors[2 * k]);
@@ -84,35 +96,46 @@ void transpose(Vector* vectors) {
     std::copy_n(turned, lanes, vectors);
   }
 #else
+  (void)d;
   (void)vectors;
 #endif
 }
 
 template <class T>
-void TransposeRows(Rows<T> rows, int left, float black, float* out, std::size_t stride, float* most) {
+void TransposeRows(Rows<T> rows, int left, T* out, std::size_t stride) {
+  const hn::CappedTag<T, tile_pixels> d;
+  const std::size_t lanes = hn::Lanes(d);
+  for (std::size_t first_pixel = 0; first_pixel < tile_pixels; first_pixel += lanes)
+    for (std::size_t first = 0; first < rows.size(); first += lanes) {
+      hn::Vec<decltype(d)> vectors[tile_pixels];
+      for (std::size_t i = 0; i < lanes; ++i)
+        vectors[i] = first + i < rows.size()
+                         ? hn::LoadU(d, rows[first + i] + static_cast<std::size_t>(left) + first_pixel)
+                         : hn::Zero(d);
+      transpose(d, vectors);
+      for (std::size_t p = 0; p < lanes; ++p) hn::StoreU(vectors[p], d, out + (first_pixel + p) * stride + first);
+    }
+}
+
+template <class T>
+float TakeOff(const T* gray, std::size_t count, float black, float* light) {
   const Floats d;
   const hn::Rebind<std::int32_t, Floats> integers;
   const hn::Rebind<T, Floats> raw;
-  const std::size_t lanes = hn::Lanes(d);
-  for (std::size_t first_pixel = 0; first_pixel < tile_pixels; first_pixel += lanes) {
-    Vector highest = hn::Zero(d);
-    for (std::size_t first = 0; first < rows.size(); first += lanes) {
-      Vector vectors[tile_pixels];
-      for (std::size_t i = 0; i < lanes; ++i) {
-        if (first + i >= rows.size()) {
-          vectors[i] = hn::Zero(d);
-          continue;
-        }
-        const T* row = rows[first + i] + static_cast<std::size_t>(left) + first_pixel;
-        const Vector gray = hn::ConvertTo(d, hn::PromoteTo(integers, hn::LoadU(raw, row)));
-        highest = hn::Max(highest, gray);
-        vectors[i] = hn::Sub(gray, hn::Set(d, black));
-      }
-      transpose(vectors);
-      for (std::size_t p = 0; p < lanes; ++p) hn::StoreU(vectors[p], d, out + (first_pixel + p) * stride + first);
-    }
-    hn::StoreU(highest, d, most + first_pixel);
+  Vector highest = hn::Zero(d);
+  std::size_t i = 0;
+  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
+    const Vector value = hn::ConvertTo(d, hn::PromoteTo(integers, hn::LoadU(raw, gray + i)));
+    highest = hn::Max(highest, value);
+    hn::StoreU(hn::Sub(value, hn::Set(d, black)), d, light + i);
   }
+  float most = hn::GetLane(hn::MaxOfLanes(d, highest));
+  for (; i < count; ++i) {
+    const auto value = static_cast<float>(gray[i]);
+    most = std::max(most, value);
+    light[i] = value - black;
+  }
+  return most;
 }
 
 void SumRows8(Rows<std::uint8_t> rows, int left, float factor, std::span<float> sums) {
@@ -121,11 +144,17 @@ void SumRows8(Rows<std::uint8_t> rows, int left, float factor, std::span<float> 
 void SumRows16(Rows<std::uint16_t> rows, int left, float factor, std::span<float> sums) {
   SumRows(rows, left, factor, sums);
 }
-void TransposeRows8(Rows<std::uint8_t> rows, int left, float black, float* out, std::size_t stride, float* most) {
-  TransposeRows(rows, left, black, out, stride, most);
+void TransposeRows8(Rows<std::uint8_t> rows, int left, std::uint8_t* out, std::size_t stride) {
+  TransposeRows(rows, left, out, stride);
 }
-void TransposeRows16(Rows<std::uint16_t> rows, int left, float black, float* out, std::size_t stride, float* most) {
-  TransposeRows(rows, left, black, out, stride, most);
+void TransposeRows16(Rows<std::uint16_t> rows, int left, std::uint16_t* out, std::size_t stride) {
+  TransposeRows(rows, left, out, stride);
+}
+float TakeOff8(const std::uint8_t* gray, std::size_t count, float black, float* light) {
+  return TakeOff(gray, count, black, light);
+}
+float TakeOff16(const std::uint16_t* gray, std::size_t count, float black, float* light) {
+  return TakeOff(gray, count, black, light);
 }
 
 }  // namespace pagesweep::HWY_NAMESPACE
@@ -139,6 +168,8 @@ HWY_EXPORT(SumRows16);
 HWY_EXPORT(KeepHighest);
 HWY_EXPORT(TransposeRows8);
 HWY_EXPORT(TransposeRows16);
+HWY_EXPORT(TakeOff8);
+HWY_EXPORT(TakeOff16);
 
 void sum_rows(std::span<const std::uint8_t* const> rows, int left, float factor, std::span<float> sums) {
   HWY_DYNAMIC_DISPATCH(SumRows8)(rows, left, factor, sums);
@@ -148,19 +179,24 @@ void sum_rows(std::span<const std::uint16_t* const> rows, int left, float factor
   HWY_DYNAMIC_DISPATCH(SumRows16)(rows, left, factor, sums);
 }
 
-void keep_highest(const BlockRows& rows, std::int32_t index, std::span<float> responses, std::span<float> rise,
-                  std::span<std::int32_t> best) {
-  HWY_DYNAMIC_DISPATCH(KeepHighest)(rows, index, responses, rise, best);
+void keep_highest(const BlockRows& rows, std::int32_t place, const HighestRow& highest, std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(KeepHighest)(rows, place, highest, count);
 }
 
-void transpose_rows(std::span<const std::uint8_t* const> rows, int left, float black, float* out, std::size_t stride,
-                    float* most) {
-  HWY_DYNAMIC_DISPATCH(TransposeRows8)(rows, left, black, out, stride, most);
+void transpose_rows(std::span<const std::uint8_t* const> rows, int left, std::uint8_t* out, std::size_t stride) {
+  HWY_DYNAMIC_DISPATCH(TransposeRows8)(rows, left, out, stride);
 }
 
-void transpose_rows(std::span<const std::uint16_t* const> rows, int left, float black, float* out, std::size_t stride,
-                    float* most) {
-  HWY_DYNAMIC_DISPATCH(TransposeRows16)(rows, left, black, out, stride, most);
+void transpose_rows(std::span<const std::uint16_t* const> rows, int left, std::uint16_t* out, std::size_t stride) {
+  HWY_DYNAMIC_DISPATCH(TransposeRows16)(rows, left, out, stride);
+}
+
+float take_off(const std::uint8_t* gray, std::size_t count, float black, float* light) {
+  return HWY_DYNAMIC_DISPATCH(TakeOff8)(gray, count, black, light);
+}
+
+float take_off(const std::uint16_t* gray, std::size_t count, float black, float* light) {
+  return HWY_DYNAMIC_DISPATCH(TakeOff16)(gray, count, black, light);
 }
 
 }  // namespace pagesweep

@@ -12,22 +12,31 @@ namespace pagesweep {
 void sum_rows(std::span<const std::uint8_t* const> rows, int left, float factor, std::span<float> sums);
 void sum_rows(std::span<const std::uint16_t* const> rows, int left, float factor, std::span<float> sums);
 
-/// responses[x] = 2 middle[x] - sides[x], and where that exceeds rise[x] it replaces it, and `index` best[x].
+/// Sums of blocks of frames, a row each: a response is twice the middle less the sides.
 struct BlockRows {
   const float* middle[2];
   const float* side[4];
 };
-void keep_highest(const BlockRows& rows, std::int32_t index, std::span<float> responses, std::span<float> rise,
-                  std::span<std::int32_t> best);
+/// The highest response so far of each pixel in a row, and those beside it. NaN: there is none.
+struct HighestRow {
+  float* rise;         ///< the highest; minus infinity before the first
+  float* before;       ///< the one before it
+  float* after;        ///< the one after it
+  float* last;         ///< of the place looked at last
+  std::int32_t* best;  ///< place of the highest
+};
+/// Looks at the next place of `count` pixels. The first of equal responses is the highest.
+void keep_highest(const BlockRows& rows, std::int32_t place, const HighestRow& highest, std::size_t count);
 
 inline constexpr int tile_pixels = 16;
 
-/// The samples of 16 neighbouring pixels in the order of time: out[p * stride + i] = row_i[left + p] - black.
+/// The samples of 16 neighbouring pixels in the order of time: out[p * stride + i] = row_i[left + p].
 /// \param stride  of out; at least the number of rows, rounded up to a multiple of 16
-/// \param most    [tile_pixels] becomes each pixel's highest gray value
-void transpose_rows(std::span<const std::uint8_t* const> rows, int left, float black, float* out, std::size_t stride,
-                    float* most);
-void transpose_rows(std::span<const std::uint16_t* const> rows, int left, float black, float* out, std::size_t stride,
-                    float* most);
+void transpose_rows(std::span<const std::uint8_t* const> rows, int left, std::uint8_t* out, std::size_t stride);
+void transpose_rows(std::span<const std::uint16_t* const> rows, int left, std::uint16_t* out, std::size_t stride);
+
+/// light[i] = gray[i] - black for `count` entries. \return the highest gray value
+float take_off(const std::uint8_t* gray, std::size_t count, float black, float* light);
+float take_off(const std::uint16_t* gray, std::size_t count, float black, float* light);
 
 }  // namespace pagesweep

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
-#include <cstdint>
 #include <hwy/targets.h>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "pagesweep/timing/row_kernels_internal.h"
@@ -60,19 +61,67 @@ TYPED_TEST(RowKernels, SumsAreExact) {
 TYPED_TEST(RowKernels, TransposedSamplesAreThoseOfTheRows) {
   this->on_every_target([&] {
     constexpr std::size_t stride = 48;
-    std::vector<float> tile(tile_pixels * stride);
-    std::array<float, tile_pixels> most;
-    transpose_rows(std::span<const TypeParam* const>(this->rows), this->left, 2.0F, tile.data(), stride, most.data());
-    for (std::size_t p = 0; p < tile_pixels; ++p) {
-      float highest = 0;
-      for (std::size_t i = 0; i < this->rows.size(); ++i) {
-        const auto gray = static_cast<float>(this->values[i][p + static_cast<std::size_t>(this->left)]);
-        EXPECT_EQ(tile[p * stride + i], gray - 2) << p << ", " << i;
-        highest = std::max(highest, gray);
-      }
-      EXPECT_EQ(most[p], highest);
+    std::vector<TypeParam> tile(tile_pixels * stride);
+    transpose_rows(std::span<const TypeParam* const>(this->rows), this->left, tile.data(), stride);
+    for (std::size_t p = 0; p < tile_pixels; ++p)
+      for (std::size_t i = 0; i < this->rows.size(); ++i)
+        EXPECT_EQ(tile[p * stride + i], this->values[i][p + static_cast<std::size_t>(this->left)]) << p << ", " << i;
+  });
+}
+
+TYPED_TEST(RowKernels, TheBlackLevelIsTakenOffAndTheHighestKnown) {
+  this->on_every_target([&] {
+    const auto& gray = this->values[7];
+    std::vector<float> light(gray.size());
+    for (const std::size_t count : {gray.size(), gray.size() - 3, std::size_t{1}}) {
+      const float most = take_off(gray.data(), count, 2.5F, light.data());
+      EXPECT_EQ(most, static_cast<float>(*std::max_element(gray.begin(), gray.begin() + static_cast<int>(count))));
+      for (std::size_t i = 0; i < count; ++i) EXPECT_EQ(light[i], static_cast<float>(gray[i]) - 2.5F) << i;
     }
   });
+}
+
+/// The highest of some responses, as a plain loop over all of them finds it.
+TEST(KeepHighest, RemembersTheHighestAndThoseBesideIt) {
+  constexpr std::size_t count = 37;
+  constexpr int places = 9;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::vector<std::vector<float>> blocks;
+  for (int k = 0; k < places + 5; ++k) {
+    blocks.emplace_back();
+    for (std::size_t x = 0; x < count; ++x)
+      blocks.back().push_back(
+          std::round(20 * static_cast<float>(testing::uniform(9, 100 * x + static_cast<std::size_t>(k)))));
+  }
+  const auto rows_at = [&](int k) {
+    const auto row = [&](int i) { return blocks[static_cast<std::size_t>(i)].data(); };
+    return BlockRows{{row(k), row(k + 1)}, {row(k + 2), row(k + 3), row(k + 4), row(k + 5)}};
+  };
+  const auto response = [&](int k, std::size_t x) {
+    const BlockRows rows = rows_at(k);
+    return 2 * (rows.middle[0][x] + rows.middle[1][x]) -
+           ((rows.side[0][x] + rows.side[1][x]) + (rows.side[2][x] + rows.side[3][x]));
+  };
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    std::vector<float> rise(count, -std::numeric_limits<float>::infinity());
+    std::vector<float> before(count, nan), after(count, nan), last(count, nan);
+    std::vector<std::int32_t> best(count, -1);
+    for (int k = 0; k < places; ++k)
+      keep_highest(rows_at(k), k, {rise.data(), before.data(), after.data(), last.data(), best.data()}, count);
+    for (std::size_t x = 0; x < count; ++x) {
+      int highest = 0;
+      for (int k = 1; k < places; ++k)
+        if (response(k, x) > response(highest, x)) highest = k;
+      EXPECT_EQ(best[x], highest) << x;
+      EXPECT_EQ(rise[x], response(highest, x)) << x;
+      EXPECT_EQ(last[x], response(places - 1, x)) << x;
+      EXPECT_TRUE(highest == 0 ? std::isnan(before[x]) : before[x] == response(highest - 1, x)) << x;
+      EXPECT_TRUE(highest + 1 == places ? std::isnan(after[x]) : after[x] == response(highest + 1, x)) << x;
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
 }
 
 }  // namespace

@@ -1,21 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "pagesweep/data/frames.h"
-#include "pagesweep/timing/bell_fit.h"
+#include "pagesweep/timing/pixel_window_internal.h"
 #include "pagesweep/timing/stripe_search_internal.h"
 
 namespace pagesweep {
-
-/// The part of one pixel's gray value sequence that surrounds the stripe, and what a first look at it tells.
-struct PixelWindow {
-  std::span<const float> gray;  ///< consecutive samples; NaN: dropped, +infinity: clipped
-  int first_frame = 0;          ///< time of gray[0]
-  Bell start;                   ///< rough, good enough to start any estimator from
-};
 
 /// Reads the pixels of one camera row by row and cuts the stripe's surroundings out of each sequence. One a thread.
 class RowWindows {
@@ -31,13 +23,9 @@ class RowWindows {
   /// \param width  of the stripe there, relative to the profile's
   PixelWindow window(int x, double width) { return window_at(x, width, frame(x)); }
   PixelWindow window_at(int x, double width, int centre);
-  /// [frames] to both sides of the stripe's middle, at width 1, that a window has.
-  static double reach_around(const StripeProfile& profile);
   int frame(int x) const { return search_.frame(x - left_); }  ///< nearest to the stripe's middle
 
  private:
-  double start_amplitude(const PixelWindow& window, double width) const;
-
   const Frames& frames_;
   const StripeProfile& profile_;
   const FrameNoise& noise_;

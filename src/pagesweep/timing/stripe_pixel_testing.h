@@ -135,9 +135,17 @@ inline Frames make_frames(int width, int height, int count, const Sensor& sensor
         images[static_cast<std::size_t>(i)](x, y) = static_cast<std::uint16_t>(
             expose(sensor.exposure(i) * light_at(x, y, i), sensor, pixel_seed, static_cast<std::uint64_t>(i)));
     }
-  for (int i = 0; i < count; ++i)
-    if (std::find(dropped.begin(), dropped.end(), i) == dropped.end())
-      frames.set(i, std::move(images[static_cast<std::size_t>(i)]));
+  for (int i = 0; i < count; ++i) {
+    if (std::find(dropped.begin(), dropped.end(), i) != dropped.end()) continue;
+    auto& image = images[static_cast<std::size_t>(i)];
+    if (sequence.is_8_bit()) {
+      Image<std::uint8_t> narrow(width, height);
+      std::ranges::transform(image.pixels(), narrow.data(), [](int gray) { return static_cast<std::uint8_t>(gray); });
+      frames.set(i, std::move(narrow));
+    } else {
+      frames.set(i, std::move(image));
+    }
+  }
   return frames;
 }
 

@@ -8,11 +8,11 @@
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/data/time_map.h"
 #include "pagesweep/timing/row_windows_internal.h"
+#include "pagesweep/timing/width_tiles_internal.h"
 
 namespace pagesweep {
 namespace {
 
-constexpr int tile_px = 32;
 constexpr int row_step = 8, column_step = 3;  // some 40 pixels a tile: half a percent each, a thousandth together
 
 struct Measured {
@@ -37,23 +37,22 @@ float robust_mean(std::vector<Measured>& values) {
     weight += value.weight;
     sum += value.weight * value.log_width;
   }
-  return static_cast<float>(sum / weight);
+  const double widest = std::log(widest_stripe);
+  return static_cast<float>(std::clamp(sum / weight, -widest, widest));
 }
 
-void measure_row(RowWindows& row, const StripeProfile& profile, const FrameNoise& noise, int width, int y,
-                 std::vector<std::vector<Measured>>& tiles) {
-  row.read(y);
-  for (int x = y / row_step % column_step; x < width; x += column_step) {
-    if (row.significance(x) < 15) continue;  // its width would be worth little
-    const PixelWindow window = row.window(x, 1);
-    const BellFit fit =
-        fit_bell(window.gray, window.first_frame, profile, noise, window.start, {.unknowns = BellUnknowns::width});
-    if (!fit.converged || fit.reduced_chi_square() > 100) continue;
-    // What a model cannot do better than a percent does not count more for being brighter.
-    const double variance = fit.covariance(3, 3) + 1e-4;
-    if (variance < 0.01)
-      tiles[static_cast<std::size_t>(x / tile_px)].push_back({std::log(fit.bell.width), 1 / variance});
-  }
+/// \param row  RowWindows or RecordedWindows
+template <class Row>
+void measure_pixel(Row& row, int x, const StripeProfile& profile, const FrameNoise& noise,
+                   std::vector<Measured>& values) {
+  if (row.significance(x) < 15) return;  // its width would be worth little
+  const PixelWindow window = row.window(x, 1);
+  const BellFit fit =
+      fit_bell(window.gray, window.first_frame, profile, noise, window.start, {.unknowns = BellUnknowns::width});
+  if (!fit.converged || fit.reduced_chi_square() > 100) return;
+  // What a model cannot do better than a percent does not count more for being brighter.
+  const double variance = fit.covariance(3, 3) + 1e-4;
+  if (variance < 0.01) values.push_back({std::log(fit.bell.width), 1 / variance});
 }
 
 /// Tiles without a value take the mean of their neighbours that have one, step by step from the border of the known.
@@ -81,7 +80,38 @@ void fill(Image<float>& tiles) {
     if (std::isnan(tile)) tile = 0;
 }
 
+/// Measures one tile; NaN without light.
+template <class Row>
+float measure_tile(Row& row, const WidthTile& tile, const StripeProfile& profile, const FrameNoise& noise) {
+  std::vector<Measured> values;
+  for (int y = tile.top; y < tile.top + tile.height; y += row_step) {
+    row.read(y, tile.left, tile.width);
+    // The columns take turns, counted over the whole picture.
+    const int phase = y / row_step % column_step;
+    const int first = tile.left + (phase - tile.left % column_step + column_step) % column_step;
+    for (int x = first; x < tile.left + tile.width; x += column_step) measure_pixel(row, x, profile, noise, values);
+  }
+  return robust_mean(values);
+}
+
 }  // namespace
+
+WidthTile width_tile(int width, int height, int column, int row) {
+  const int left = column * width_tile_px, top = row * width_tile_px;
+  return {left, top, std::min(width_tile_px, width - left), std::min(width_tile_px, height - top)};
+}
+
+int width_tiles(int pixels) { return (pixels + width_tile_px - 1) / width_tile_px; }
+
+float measure_width(RecordedWindows& row, const WidthTile& tile, const StripeProfile& profile,
+                    const FrameNoise& noise) {
+  return measure_tile(row, tile, profile, noise);
+}
+
+StripeWidths widths_of_tiles(Image<float> tiles) {
+  fill(tiles);
+  return {std::move(tiles), width_tile_px};
+}
 
 double StripeWidths::at(int x, int y) const {
   float log_width = 0;
@@ -108,6 +138,11 @@ void StripeWidths::log_row(int y, int left, std::span<float> log_widths) const {
   }
 }
 
+float StripeWidths::tile(int column, int row) const {
+  if (log_width_.empty()) return 0;
+  return log_width_(std::clamp(column, 0, log_width_.width() - 1), std::clamp(row, 0, log_width_.height() - 1));
+}
+
 std::pair<double, double> StripeWidths::range() const {
   if (log_width_.empty()) return {1, 1};
   const auto [low, high] = std::ranges::minmax(log_width_.pixels());
@@ -115,18 +150,14 @@ std::pair<double, double> StripeWidths::range() const {
 }
 
 StripeWidths measure_widths(const Frames& frames, const StripeProfile& profile, const SensorNoise& noise) {
-  Image<float> tiles((frames.width() + tile_px - 1) / tile_px, (frames.height() + tile_px - 1) / tile_px, not_a_number);
+  Image<float> tiles(width_tiles(frames.width()), width_tiles(frames.height()), not_a_number);
   const FrameNoise frame_noise(noise, frames.sequence().exposures);
-  parallel_rows(tiles.height(), [&](int tile_row) {
+  parallel_rows(tiles.height(), [&](int y) {
     RowWindows row(frames, profile, frame_noise);
-    std::vector<std::vector<Measured>> values(static_cast<std::size_t>(tiles.width()));
-    const int end = std::min(frames.height(), (tile_row + 1) * tile_px);
-    for (int y = tile_row * tile_px; y < end; y += row_step)
-      measure_row(row, profile, frame_noise, frames.width(), y, values);
-    for (int x = 0; x < tiles.width(); ++x) tiles(x, tile_row) = robust_mean(values[static_cast<std::size_t>(x)]);
+    for (int x = 0; x < tiles.width(); ++x)
+      tiles(x, y) = measure_tile(row, width_tile(frames.width(), frames.height(), x, y), profile, frame_noise);
   });
-  fill(tiles);
-  return {std::move(tiles), tile_px};
+  return widths_of_tiles(std::move(tiles));
 }
 
 }  // namespace pagesweep

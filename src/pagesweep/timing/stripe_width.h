@@ -11,6 +11,9 @@
 
 namespace pagesweep {
 
+/// [relative to the profile] No stripe is taken to be wider, nor narrower than its inverse.
+inline constexpr double widest_stripe = 1.5;
+
 /// How wide the stripe is in each part of a camera's picture, relative to its profile. Light diverges, so paper nearer
 /// to the lamp sees a narrower stripe; unless that is known, bright pixels fit worse than their noise allows, and time
 /// values from one flank (skewed stripes, clipped samples) are off.
@@ -23,6 +26,8 @@ class StripeWidths {
   double at(int x, int y) const;
   /// The logarithms of the relative widths of pixels (left, y), (left + 1, y), ...
   void log_row(int y, int left, std::span<float> log_widths) const;
+  /// Logarithm of one tile's relative width; beyond the tiles, of the nearest one.
+  float tile(int column, int row) const;
   /// Of the tiles, lowest and highest.
   std::pair<double, double> range() const;
 

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "pagesweep/timing/bell_fit.h"
+#include "pagesweep/timing/sensor_noise.h"
+#include "pagesweep/timing/stripe_profile.h"
+
+namespace pagesweep {
+
+/// The part of one pixel's gray value sequence that surrounds the stripe, and what a first look at it tells.
+struct PixelWindow {
+  std::span<const float> gray;  ///< consecutive samples; NaN: dropped, +infinity: clipped
+  int first_frame = 0;          ///< time of gray[0]
+  Bell start;                   ///< rough, good enough to start any estimator from
+};
+
+/// [frames] to both sides of the stripe's middle, at width 1, that a window has.
+double reach_around(const StripeProfile& profile);
+
+/// Takes a first look at samples.
+/// \param centre  [frames] where the bell is expected
+/// \param width   of the stripe there, relative to the profile's
+PixelWindow make_window(std::span<const float> gray, int first_frame, double centre, double width,
+                        const StripeProfile& profile, const FrameNoise& noise);
+
+}  // namespace pagesweep

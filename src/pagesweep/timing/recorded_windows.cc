@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/recorded_windows_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pagesweep/data/time_map.h"
+
+namespace pagesweep {
+namespace {
+
+/// Calls body(gray) with the pixel's samples, of whichever depth.
+template <class Body>
+auto with_gray(const StripeWindows& windows, int x, int y, const Body& body) {
+  return windows.is_8_bit() ? body(windows.gray<std::uint8_t>(x, y)) : body(windows.gray<std::uint16_t>(x, y));
+}
+
+}  // namespace
+
+RecordedWindows::RecordedWindows(const StripeWindows& windows, const StripeProfile& profile, const FrameNoise& noise)
+    : windows_(windows), profile_(profile), noise_(noise), reach_(reach_around(profile)) {}
+
+int RecordedWindows::frame(int x) const {
+  const int centre = windows_.centre(x, y_), half = windows_.half(), length = windows_.length();
+  const int near = static_cast<int>(std::ceil(0.5 * profile_.full_width_half_maximum()));
+  const float* present = windows_.present(centre - half);
+  return with_gray(windows_, x, y_, [&](const auto* gray) {
+    // A dropped frame does not end a plateau.
+    const auto is_clipped = [&](int k) { return gray[k] >= windows_.sequence().saturation || present[k] == 0; };
+    int begin = std::max(0, half - near);
+    const int stop = std::min(length, half + near + 1);
+    while (begin < stop && !(is_clipped(begin) && present[begin] > 0)) ++begin;
+    if (begin == stop) return centre;
+    int end = begin;
+    while (end < length && is_clipped(end)) ++end;
+    while (begin > 0 && is_clipped(begin - 1)) --begin;
+    return centre - half + (begin + end - 1) / 2;
+  });
+}
+
+PixelWindow RecordedWindows::window_at(int x, double width, int centre) {
+  const Sequence& sequence = windows_.sequence();
+  const int reach = static_cast<int>(std::ceil(reach_ * width));
+  const int first = windows_.centre(x, y_) - windows_.half();
+  const int begin = std::max({0, first, centre - reach});
+  const int end = std::min({sequence.count, first + windows_.length(), centre + reach + 1});
+  gray_.clear();
+  with_gray(windows_, x, y_, [&](const auto* gray) {
+    for (int i = begin; i < end; ++i) {
+      const double value = gray[i - first];
+      const bool is_clipped = value >= sequence.saturation;
+      gray_.push_back(*windows_.present(i) == 0 ? not_a_number
+                      : is_clipped              ? std::numeric_limits<float>::infinity()
+                                                : static_cast<float>(value - sequence.black_level));
+    }
+  });
+  return make_window(gray_, begin, centre, width, profile_, noise_);
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/stripe_recorder_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <type_traits>
+
+#include "pagesweep/base/parallel.h"
+#include "pagesweep/timing/row_kernels_internal.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr int columns_at_once = 256;  // whose sums stay in the cache
+constexpr int most_apart = 32;        // [frames] between the bells of pixels that are cut out together
+/// Half a sigma less than a bell needs to be told from noise: between two blocks the response is that much lower.
+constexpr float least_significance = 3;
+
+int tiles_over(int pixels) { return (pixels + StripeRecorder::tile_px - 1) / StripeRecorder::tile_px; }
+
+/// Counts the frames begin, begin + 1, ... before `end` in which each pixel of row y is clipped.
+void count_clipped(const Frames& frames, int begin, int end, int y, std::span<std::uint8_t> counts) {
+  for (int i = begin; i < end; ++i) {
+    if (!frames.has(i)) continue;
+    std::visit(
+        [&](const auto& image) {
+          const auto* row = image.row(y).data();
+          using T = std::remove_cvref_t<decltype(*row)>;
+          if (frames.sequence().saturation > std::numeric_limits<T>::max()) return;
+          const T saturation = static_cast<T>(std::max(0.0, std::ceil(frames.sequence().saturation)));
+          std::uint8_t* count = counts.data();
+          for (std::size_t x = 0; x < counts.size(); ++x)
+            count[x] = static_cast<std::uint8_t>(count[x] + ((row[x] >= saturation) & (count[x] < 255)));
+        },
+        frames.frame(i));
+  }
+}
+
+}  // namespace
+
+struct StripeRecorder::Scratch {
+  struct Ready {
+    int x;
+    int centre;  ///< [frames]
+  };
+  Image<float> sums;
+  std::vector<Ready> ready;
+  std::vector<std::uint16_t> tile;  ///< of either depth
+};
+
+bool StripeRecorder::can_record(const Sequence& sequence) {
+  return sequence.width >= tile_pixels &&
+         std::ranges::all_of(sequence.exposures, [](double exposure) { return exposure == 1; });
+}
+
+StripeRecorder::StripeRecorder(const Sequence& sequence, double fwhm, int half, double read_variance)
+    : search_(sequence.width, sequence.height, fwhm, read_variance),
+      windows_(sequence, half),
+      recorded_place_(sequence.width, sequence.height, -1),
+      tiles_(tiles_over(sequence.width), tiles_over(sequence.height)),
+      clipped_(sequence.width, sequence.height) {}
+
+int StripeRecorder::last_ready(int end) const {
+  // A bell's middle is within half a block of its place, place k at the border (k + 1) block; and the response after
+  // the highest one must have been seen.
+  const int block = search_.block();
+  return std::min((end - 1 - windows_.half() - (block + 1) / 2) / block - 1, end / block - 6);
+}
+
+int StripeRecorder::first_needed() const {
+  const int block = search_.block();
+  const int first_of_window = (ready_done_ + 2) * block - (block + 1) / 2 - 1 - windows_.half();
+  return std::max(0, std::min(first_of_window, search_.first_needed(places_done_)));
+}
+
+void StripeRecorder::look(const Frames& frames, int end, bool ended) {
+  Step step;
+  step.search = search_.next_step(places_done_, end, ended);
+  step.last_ready = ended ? std::numeric_limits<int>::max() : last_ready(end);
+  step.begin = first_needed();
+  step.end = end;
+  step.news = frames_done_;
+  present_.resize(static_cast<std::size_t>(end), 0);
+  for (int i = frames_done_; i < end; ++i) present_[static_cast<std::size_t>(i)] = frames.has(i);
+  windows_.set_present(present_);
+  // What stands for a frame that was dropped may lie before.
+  while (step.begin > 0 && !frames.has(step.begin)) --step.begin;
+  bool any = false;
+  for (int i = step.begin; i < end; ++i) any = any || frames.has(i);
+  if (!any) return;
+  parallel_ranges(windows_.sequence().height, tile_px,
+                  [&](int begin_row, int end_row) { look_at_rows(frames, step, begin_row, end_row); });
+  places_done_ = step.search.end_place;
+  ready_done_ = ended ? step.search.end_place : step.last_ready;
+  frames_done_ = end;
+}
+
+void StripeRecorder::look_at_rows(const Frames& frames, const Step& step, int first_row, int end_row) {
+  const Sequence& sequence = windows_.sequence();
+  for (Tile& tile : tiles_.row(first_row / tile_px)) tile.waiting = 0;
+  Scratch scratch;
+  // The kernel fills whole vectors.
+  scratch.tile.resize(static_cast<std::size_t>((tile_pixels + 1) * (windows_.length() + most_apart + tile_pixels)));
+  for (int y = first_row; y < end_row; ++y) {
+    count_clipped(frames, step.news, step.end, y, clipped_.row(y));
+    const RawRow rows = raw_row(frames, y, step.begin, step.end);
+    for (int left = 0; left < sequence.width; left += columns_at_once) {
+      const int columns = std::min(columns_at_once, sequence.width - left);
+      search_.look(step.search, rows, step.begin, y, left, columns, scratch.sums);
+      for (int first = left; first < left + columns; first += tile_pixels) record(step, rows, y, first, scratch);
+    }
+  }
+}
+
+void StripeRecorder::record(const Step& step, const RawRow& rows, int y, int left, Scratch& scratch) {
+  scratch.ready.clear();
+  Tile& tile = tiles_(left / tile_px, y / tile_px);
+  const int end = std::min(left + tile_pixels, windows_.sequence().width);
+  for (int x = left; x < end; ++x) {
+    const int best = search_.best(x, y);
+    if (best == recorded_place_(x, y)) continue;
+    const float significance = search_.significance(x, y);
+    if (significance < least_significance) continue;
+    if (best > step.last_ready) {
+      ++tile.waiting;
+      continue;
+    }
+    scratch.ready.push_back({x, search_.frame(x, y, windows_.sequence().count)});
+    tile.pixels += windows_.centre(x, y) == StripeWindows::none;
+    recorded_place_(x, y) = best;
+    windows_.set(x, y, scratch.ready.back().centre, significance);
+  }
+  if (scratch.ready.empty()) return;
+  tile.windows += static_cast<int>(scratch.ready.size());
+  std::visit([&](const auto& present) { cut(step, present, y, left, scratch); }, rows);
+}
+
+template <class T>
+void StripeRecorder::cut(const Step& step, const RowsOf<T>& rows, int y, int left, Scratch& scratch) {
+  const int tile_left = std::min(left, windows_.sequence().width - tile_pixels), half = windows_.half();
+  T* const tile = reinterpret_cast<T*>(scratch.tile.data());
+  std::vector<Scratch::Ready>& ready = scratch.ready;
+  while (!ready.empty()) {
+    const int first = std::ranges::min(ready, {}, &Scratch::Ready::centre).centre;
+    const auto is_near = [first](const Scratch::Ready& pixel) { return pixel.centre <= first + most_apart; };
+    int last = first;
+    for (const auto& pixel : ready)
+      if (is_near(pixel)) last = std::max(last, pixel.centre);
+    RowsOf<T> around;
+    for (int i = first - half; i <= last + half; ++i)
+      around.push_back(rows[static_cast<std::size_t>(std::clamp(i, step.begin, step.end - 1) - step.begin)]);
+    const std::size_t stride = (around.size() + tile_pixels - 1) / tile_pixels * tile_pixels;
+    transpose_rows(around, tile_left, tile, stride);
+    for (const auto& pixel : ready)
+      if (is_near(pixel))
+        std::memcpy(windows_.gray<T>(pixel.x, y),
+                    tile + static_cast<std::size_t>(pixel.x - tile_left) * stride + (pixel.centre - first),
+                    static_cast<std::size_t>(windows_.length()) * sizeof(T));
+    std::erase_if(ready, is_near);
+  }
+}
+
+}  // namespace pagesweep

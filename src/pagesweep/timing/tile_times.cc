@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/tile_times_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "pagesweep/timing/row_kernels_internal.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr float hardly_significant = 4;
+
+}  // namespace
+
+TileTimes::TileTimes(const StripeWindows& windows, const BellTables& tables, const StripeWidths& widths,
+                     const PixelJudge& judge, TimeMap& map)
+    : windows_(windows),
+      widths_(widths),
+      judge_(judge),
+      map_(map),
+      alone_(windows, judge.profile, judge.noise),
+      bells_(tables, judge.noise.sensor(), judge.profile.full_width_half_maximum()),
+      // What follows a pixel's samples is another's, or 0.
+      light_(static_cast<std::size_t>(tile_pixels * windows.length() + most_bells)) {}
+
+void TileTimes::estimate(int y, int left, int columns) {
+  alone_.read(y);
+  log_widths_.resize(tile_pixels);
+  for (int first = left; first < left + columns; first += tile_pixels) {
+    gather(y, first, std::min(tile_pixels, left + columns - first));
+    if (candidates_.empty()) continue;
+    for (const bool whole : {true, false}) fit(whole, y);
+  }
+}
+
+void TileTimes::gather(int y, int left, int columns) {
+  const Sequence& sequence = windows_.sequence();
+  const auto black = static_cast<float>(sequence.black_level), saturation = static_cast<float>(sequence.saturation);
+  const auto length = static_cast<std::size_t>(windows_.length());
+  candidates_.clear();
+  widths_.log_row(y, left, std::span(log_widths_).first(static_cast<std::size_t>(columns)));
+  for (int k = 0; k < columns; ++k) {
+    const int x = left + k, centre = windows_.centre(x, y);
+    if (centre == StripeWindows::none) {
+      set_time(map_, x, y, {});
+      continue;
+    }
+    float* light = &light_[static_cast<std::size_t>(k) * length];
+    const Candidate candidate{x, centre, log_widths_[static_cast<std::size_t>(k)],
+                              windows_.significance(x, y) < hardly_significant, light};
+    const float most = windows_.is_8_bit() ? take_off(windows_.gray<std::uint8_t>(x, y), length, black, light)
+                                           : take_off(windows_.gray<std::uint16_t>(x, y), length, black, light);
+    if (most >= saturation && is_clipped(candidate))
+      set_time(map_, x, y, look_closely(candidate));
+    else
+      candidates_.push_back(candidate);
+  }
+}
+
+bool TileTimes::is_clipped(const Candidate& candidate) const {
+  const auto limit = static_cast<float>(windows_.sequence().saturation - windows_.sequence().black_level);
+  const int reach = bells_.reach(candidate.log_width), first = windows_.half() - reach;
+  const float* present = windows_.present(candidate.centre - reach);
+  for (int k = 0; k <= 2 * reach; ++k)
+    if (candidate.light[first + k] >= limit && present[k] > 0) return true;
+  return false;
+}
+
+bool TileTimes::is_whole(const Candidate& candidate) const {
+  const int reach = bells_.reach(candidate.log_width);
+  return windows_.are_present(candidate.centre - reach, 2 * reach + 1);
+}
+
+void TileTimes::fit(bool whole, int y) {
+  bells_.clear();
+  fitted_.clear();
+  for (const Candidate& candidate : candidates_) {
+    if (is_whole(candidate) != whole) continue;
+    fitted_.push_back(candidate);
+    bells_.add(candidate.centre, candidate.log_width, candidate.light,
+               windows_.present(candidate.centre - windows_.half()));
+  }
+  if (fitted_.empty()) return;
+  whole ? bells_.fit() : bells_.fit_partial();
+  for (std::size_t i = 0; i < fitted_.size(); ++i) {
+    const Candidate& candidate = fitted_[i];
+    auto time = time_of_plain_bell(bells_[static_cast<int>(i)], std::exp(candidate.log_width), judge_);
+    if (time && time->status != PixelStatus::truncated && !whole) time->status = judge_partial(candidate, *time);
+    set_time(map_, candidate.x, y, time ? *time : candidate.may_be_noise ? PixelTime{} : look_closely(candidate));
+  }
+}
+
+PixelTime TileTimes::look_closely(const Candidate& candidate) {
+  const double width = std::exp(candidate.log_width);
+  return time_by_likelihood_around(
+      alone_.frame(candidate.x), [&](int frame) { return alone_.window_at(candidate.x, width, frame); }, judge_);
+}
+
+PixelStatus TileTimes::judge_partial(const Candidate& candidate, const PixelTime& time) {
+  const int reach = bells_.reach(candidate.log_width), first = candidate.centre - windows_.half();
+  const int begin = std::max(0, candidate.centre - reach);
+  const int end = std::min(judge_.frame_count, candidate.centre + reach + 1);
+  window_.clear();
+  for (int i = begin; i < end; ++i)
+    window_.push_back(*windows_.present(i) > 0 ? candidate.light[i - first] : not_a_number);
+  const Bell bell{time.amplitude, time.background, time.bell_time, std::exp(candidate.log_width)};
+  return judge_bell({window_, begin, bell}, bell, time.sigma, judge_);
+}
+
+}  // namespace pagesweep

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/time_stream.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <deque>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "pagesweep/timing/learn_profile.h"
+#include "pagesweep/timing/recorded_times_internal.h"
+
+namespace pagesweep {
+namespace {
+
+/// [frames] Fewer and every pixel's search is taken up and laid down more often; more and more frames are kept.
+constexpr int frames_a_step = 8;
+
+}  // namespace
+
+/// What there is once the stripe is known.
+struct TimeStream::Learned {
+  LearnedStripe stripe;
+  std::deque<std::optional<RecordedTimes>> cameras;  ///< none any more when it is done
+};
+
+TimeStream::TimeStream(const std::vector<Sequence>& sequences, const TimingOptions& options)
+    : options_(options), arrived_(sequences.size(), 0), next_lesson_(next_lesson(0)) {
+  if (sequences.empty()) throw std::invalid_argument("TimeStream: at least one camera is needed");
+  for (const Sequence& sequence : sequences) frames_.emplace_back(sequence);
+  follows_ = std::ranges::all_of(
+      sequences, [&](const Sequence& sequence) { return RecordedTimes::can_estimate(sequence, options); });
+}
+
+TimeStream::TimeStream(TimeStream&&) noexcept = default;
+TimeStream::~TimeStream() = default;
+
+void TimeStream::add(FrameSet set) {
+  for (std::size_t c = 0; c < frames_.size(); ++c) {
+    if (!set.images[c]) continue;
+    frames_[c].set(set.index, *std::move(set.images[c]));
+    ++arrived_[c];
+  }
+  if (!follows_) return;
+  const int end = set.index + 1;
+  while (!learned_ && next_lesson_ <= end) learn(std::exchange(next_lesson_, next_lesson(next_lesson_)));
+  if (learned_ && end - looked_at_ >= frames_a_step) follow(end);
+}
+
+void TimeStream::learn(int end) {
+  const bool is_all = std::ranges::all_of(frames_, [end](const Frames& frames) { return end >= frames.count(); });
+  if (is_all) return;
+  auto stripe = learn_stripe_early(frames_, end);
+  if (!stripe) return;
+  learned_ = std::make_unique<Learned>(Learned{*std::move(stripe), {}});
+  for (std::size_t c = 0; c < frames_.size(); ++c) follow_camera(c);
+}
+
+void TimeStream::follow_camera(std::size_t c) {
+  const LearnedStripe& stripe = learned_->stripe;
+  learned_->cameras.emplace_back(std::in_place, frames_[c].sequence(), stripe.profile, stripe.noise[c], options_);
+}
+
+void TimeStream::follow(int end) {
+  for (std::size_t c = 0; c < frames_.size(); ++c) {
+    RecordedTimes& times = *learned_->cameras[c];
+    Frames& frames = frames_[c];
+    times.look(frames, std::min(end, frames.count()));
+    // The last frame before what is needed may stand for a dropped one.
+    int kept = times.first_needed();
+    while (kept > 0 && !frames.has(kept)) --kept;
+    for (int i = 0; i < kept; ++i) frames.forget(i);
+  }
+  looked_at_ = end;
+}
+
+Timing TimeStream::finish(Progress& progress) {
+  for (std::size_t c = 0; c < frames_.size(); ++c)
+    if (dropped_frames(c) > 0)
+      progress.warn(fmt::format("{}: {} of {} frames were dropped", frames_[c].sequence().camera, dropped_frames(c),
+                                frames_[c].count()));
+  if (!follows_) return estimate_times(frames_, options_, progress);
+  if (!learned_) learned_ = std::make_unique<Learned>(Learned{learn_stripe(frames_), {}});
+  Timing timing{learned_->stripe.profile, learned_->stripe.noise, {}, {}};
+  for (std::size_t c = 0; c < frames_.size(); ++c) {
+    if (c == learned_->cameras.size()) follow_camera(c);
+    RecordedTimes& times = *learned_->cameras[c];
+    times.finish(frames_[c]);
+    for (int i = 0; i < frames_[c].count(); ++i) frames_[c].forget(i);
+    timing.widths.push_back(std::move(times.widths()));
+    timing.maps.push_back(std::move(times.map()));
+    clipped_.push_back(std::move(times.clipped_frames()));
+    learned_->cameras[c].reset();
+  }
+  learned_.reset();
+  return timing;
+}
+
+int TimeStream::frames_kept() const {
+  int kept = 0;
+  for (const Frames& frames : frames_) kept += frames.count() - frames.dropped();
+  return kept;
+}
+
+}  // namespace pagesweep
