@@ -123,7 +123,6 @@ void RecordedTimes::finish(const Frames& frames) {
   measure_widths(to_measure);
   for (Tile& tile : tiles_)
     if (tile.estimated_from != recorded(tile) || tile.widths != widths_around(tile)) to_estimate.push_back(&tile);
-  if (getenv("DBG")) { int never=0, empty=0, again=0; for (Tile* t : to_estimate) { if (recorded(*t)==0) empty++; else if (t->estimated_from<0) never++; else again++; } fprintf(stderr, "finish: measure %zu estimate %zu: empty %d never %d again %d\n", to_measure.size(), to_estimate.size(), empty, never, again); }
   estimate(to_estimate);
 }
 

@@ -44,6 +44,31 @@ void SumRows(Rows<T> rows, int left, float factor, std::span<float> sums) {
   }
 }
 
+template <class T>
+void CountClipped(Rows<T> rows, T saturation, std::span<std::uint8_t> counts) {
+  const hn::ScalableTag<T> d;
+  const auto lanes = hn::Lanes(d);
+  const auto limit = hn::Set(d, saturation), one = hn::Set(d, T{1});
+  HWY_ALIGN T clipped[hn::MaxLanes(d)];
+  std::size_t x = 0;
+  const auto add = [&](std::size_t at, unsigned many) {
+    counts[at] = static_cast<std::uint8_t>(std::min(255U, counts[at] + many));
+  };
+  for (; x + lanes <= counts.size(); x += lanes) {
+    auto count = hn::Zero(d);
+    for (const T* row : rows) {
+      // Unsigned a >= b where the larger of the two is a.
+      const auto gray = hn::LoadU(d, row + x);
+      count = hn::SaturatedAdd(count, hn::IfThenElseZero(hn::Eq(hn::Max(gray, limit), gray), one));
+    }
+    if (hn::AllTrue(d, hn::Eq(count, hn::Zero(d)))) continue;
+    hn::Store(count, d, clipped);
+    for (std::size_t k = 0; k < lanes; ++k) add(x + k, clipped[k]);
+  }
+  for (; x < counts.size(); ++x)
+    for (const T* row : rows) add(x, row[x] >= saturation);
+}
+
 void KeepHighest(const BlockRows& rows, std::int32_t place, const HighestRow& highest, std::size_t count) {
   const Floats d;
   const hn::RebindToSigned<Floats> integers;
@@ -144,6 +169,12 @@ void SumRows8(Rows<std::uint8_t> rows, int left, float factor, std::span<float> 
 void SumRows16(Rows<std::uint16_t> rows, int left, float factor, std::span<float> sums) {
   SumRows(rows, left, factor, sums);
 }
+void CountClipped8(Rows<std::uint8_t> rows, std::uint8_t saturation, std::span<std::uint8_t> counts) {
+  CountClipped(rows, saturation, counts);
+}
+void CountClipped16(Rows<std::uint16_t> rows, std::uint16_t saturation, std::span<std::uint8_t> counts) {
+  CountClipped(rows, saturation, counts);
+}
 void TransposeRows8(Rows<std::uint8_t> rows, int left, std::uint8_t* out, std::size_t stride) {
   TransposeRows(rows, left, out, stride);
 }
@@ -165,6 +196,8 @@ namespace pagesweep {
 
 HWY_EXPORT(SumRows8);
 HWY_EXPORT(SumRows16);
+HWY_EXPORT(CountClipped8);
+HWY_EXPORT(CountClipped16);
 HWY_EXPORT(KeepHighest);
 HWY_EXPORT(TransposeRows8);
 HWY_EXPORT(TransposeRows16);
@@ -177,6 +210,16 @@ void sum_rows(std::span<const std::uint8_t* const> rows, int left, float factor,
 
 void sum_rows(std::span<const std::uint16_t* const> rows, int left, float factor, std::span<float> sums) {
   HWY_DYNAMIC_DISPATCH(SumRows16)(rows, left, factor, sums);
+}
+
+void count_clipped_rows(std::span<const std::uint8_t* const> rows, std::uint8_t saturation,
+                        std::span<std::uint8_t> counts) {
+  HWY_DYNAMIC_DISPATCH(CountClipped8)(rows, saturation, counts);
+}
+
+void count_clipped_rows(std::span<const std::uint16_t* const> rows, std::uint16_t saturation,
+                        std::span<std::uint8_t> counts) {
+  HWY_DYNAMIC_DISPATCH(CountClipped16)(rows, saturation, counts);
 }
 
 void keep_highest(const BlockRows& rows, std::int32_t place, const HighestRow& highest, std::size_t count) {

@@ -28,6 +28,12 @@ struct HighestRow {
 /// Looks at the next place of `count` pixels. The first of equal responses is the highest.
 void keep_highest(const BlockRows& rows, std::int32_t place, const HighestRow& highest, std::size_t count);
 
+/// Adds to counts[x] in how many rows row[x] >= saturation, up to 255.
+void count_clipped_rows(std::span<const std::uint8_t* const> rows, std::uint8_t saturation,
+                        std::span<std::uint8_t> counts);
+void count_clipped_rows(std::span<const std::uint16_t* const> rows, std::uint16_t saturation,
+                        std::span<std::uint8_t> counts);
+
 inline constexpr int tile_pixels = 16;
 
 /// The samples of 16 neighbouring pixels in the order of time: out[p * stride + i] = row_i[left + p].

@@ -69,6 +69,20 @@ TYPED_TEST(RowKernels, TransposedSamplesAreThoseOfTheRows) {
   });
 }
 
+TYPED_TEST(RowKernels, ClippedSamplesAreCounted) {
+  this->on_every_target([&] {
+    const auto saturation = static_cast<TypeParam>(std::numeric_limits<TypeParam>::max() / 3);
+    std::vector<std::uint8_t> counts(this->width, 7);
+    counts[1] = 250;
+    std::vector<unsigned> expected(counts.begin(), counts.end());
+    for (int k = 0; k < 2; ++k) count_clipped_rows(std::span<const TypeParam* const>(this->rows), saturation, counts);
+    for (std::size_t x = 0; x < counts.size(); ++x) {
+      for (const auto& row : this->values) expected[x] += row[x] >= saturation ? 2 : 0;
+      EXPECT_EQ(counts[x], std::min(expected[x], 255U)) << x;
+    }
+  });
+}
+
 TYPED_TEST(RowKernels, TheBlackLevelIsTakenOffAndTheHighestKnown) {
   this->on_every_target([&] {
     const auto& gray = this->values[7];

@@ -7,7 +7,6 @@
 #include <cstring>
 #include <limits>
 #include <span>
-#include <type_traits>
 
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/timing/row_kernels_internal.h"
@@ -23,21 +22,14 @@ constexpr float least_significance = 3;
 int tiles_over(int pixels) { return (pixels + StripeRecorder::tile_px - 1) / StripeRecorder::tile_px; }
 
 /// Counts the frames begin, begin + 1, ... before `end` in which each pixel of row y is clipped.
+template <class T>
 void count_clipped(const Frames& frames, int begin, int end, int y, std::span<std::uint8_t> counts) {
-  for (int i = begin; i < end; ++i) {
-    if (!frames.has(i)) continue;
-    std::visit(
-        [&](const auto& image) {
-          const auto* row = image.row(y).data();
-          using T = std::remove_cvref_t<decltype(*row)>;
-          if (frames.sequence().saturation > std::numeric_limits<T>::max()) return;
-          const T saturation = static_cast<T>(std::max(0.0, std::ceil(frames.sequence().saturation)));
-          std::uint8_t* count = counts.data();
-          for (std::size_t x = 0; x < counts.size(); ++x)
-            count[x] = static_cast<std::uint8_t>(count[x] + ((row[x] >= saturation) & (count[x] < 255)));
-        },
-        frames.frame(i));
-  }
+  const double saturation = std::max(0.0, std::ceil(frames.sequence().saturation));
+  if (saturation > std::numeric_limits<T>::max()) return;
+  RowsOf<T> rows;
+  for (int i = begin; i < end; ++i)
+    if (frames.has(i)) rows.push_back(std::get<Image<T>>(frames.frame(i)).row(y).data());
+  count_clipped_rows(rows, static_cast<T>(saturation), counts);
 }
 
 }  // namespace
@@ -106,7 +98,10 @@ void StripeRecorder::look_at_rows(const Frames& frames, const Step& step, int fi
   // The kernel fills whole vectors.
   scratch.tile.resize(static_cast<std::size_t>((tile_pixels + 1) * (windows_.length() + most_apart + tile_pixels)));
   for (int y = first_row; y < end_row; ++y) {
-    count_clipped(frames, step.news, step.end, y, clipped_.row(y));
+    if (sequence.is_8_bit())
+      count_clipped<std::uint8_t>(frames, step.news, step.end, y, clipped_.row(y));
+    else
+      count_clipped<std::uint16_t>(frames, step.news, step.end, y, clipped_.row(y));
     const RawRow rows = raw_row(frames, y, step.begin, step.end);
     for (int left = 0; left < sequence.width; left += columns_at_once) {
       const int columns = std::min(columns_at_once, sequence.width - left);

@@ -86,16 +86,30 @@ void TileTimes::fit(bool whole, int y) {
   whole ? bells_.fit() : bells_.fit_partial();
   for (std::size_t i = 0; i < fitted_.size(); ++i) {
     const Candidate& candidate = fitted_[i];
-    auto time = time_of_plain_bell(bells_[static_cast<int>(i)], std::exp(candidate.log_width), judge_);
-    if (time && time->status != PixelStatus::truncated && !whole) time->status = judge_partial(candidate, *time);
-    set_time(map_, candidate.x, y, time ? *time : candidate.may_be_noise ? PixelTime{} : look_closely(candidate));
+    const PlainBells::Fit bell = bells_[static_cast<int>(i)];
+    auto time = time_of_plain_bell(bell, std::exp(candidate.log_width), judge_);
+    if (time && time->status != PixelStatus::truncated && !whole && !is_recorded(*time, candidate.log_width))
+      time->status = judge_partial(candidate, *time);
+    if (!time) time = candidate.may_be_noise ? PixelTime{} : look_closely(candidate, &bell);
+    set_time(map_, candidate.x, y, *time);
   }
 }
 
-PixelTime TileTimes::look_closely(const Candidate& candidate) {
+PixelTime TileTimes::look_closely(const Candidate& candidate, const PlainBells::Fit* plain) {
   const double width = std::exp(candidate.log_width);
-  return time_by_likelihood_around(
-      alone_.frame(candidate.x), [&](int frame) { return alone_.window_at(candidate.x, width, frame); }, judge_);
+  const auto window_around = [&](int frame) {
+    PixelWindow window = alone_.window_at(candidate.x, width, frame);
+    if (plain && plain->converged) window.start = {plain->amplitude, plain->background, plain->time, width};
+    return window;
+  };
+  return time_by_likelihood_around(alone_.frame(candidate.x), window_around, judge_);
+}
+
+bool TileTimes::is_recorded(const PixelTime& time, double log_width) const {
+  const double width = std::exp(log_width);
+  const int begin = static_cast<int>(std::floor(time.bell_time + width * judge_.profile.begin()));
+  const int end = static_cast<int>(std::ceil(time.bell_time + width * judge_.profile.end()));
+  return windows_.are_present(begin, end - begin + 1);
 }
 
 PixelStatus TileTimes::judge_partial(const Candidate& candidate, const PixelTime& time) {

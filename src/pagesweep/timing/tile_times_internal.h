@@ -35,7 +35,10 @@ class TileTimes {
   bool is_clipped(const Candidate& candidate) const;
   bool is_whole(const Candidate& candidate) const;
   void fit(bool whole, int y);
-  PixelTime look_closely(const Candidate& candidate);
+  /// \param plain  its fit as a plain case, which did not do; null: there is none
+  PixelTime look_closely(const Candidate& candidate, const PlainBells::Fit* plain = nullptr);
+  /// Whether every frame is there that shows something of the bell.
+  bool is_recorded(const PixelTime& time, double log_width) const;
   /// The verdict on a bell of which samples are missing.
   PixelStatus judge_partial(const Candidate& candidate, const PixelTime& time);
 
