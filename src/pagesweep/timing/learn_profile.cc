@@ -154,9 +154,9 @@ std::vector<Pupil> select(std::vector<Pupil> pupils, std::size_t most, const Les
   std::nth_element(amplitudes.begin(), high, amplitudes.end());
   std::erase_if(pupils, [bright = 0.5 * *high](const Pupil& p) { return p.bell.amplitude < bright; });
   const double width = typical_width(pupils);
-  const double before = 1.5 * width, after = (lesson.is_last ? 1.5 : widest_reach) * width;
+  const double margin = (lesson.is_last ? 1.5 : widest_reach) * width;
   std::erase_if(pupils, [&](const Pupil& p) {
-    return std::abs(p.fwhm - width) > 0.35 * width || p.middle < before || p.middle > lesson.end - 1 - after;
+    return std::abs(p.fwhm - width) > 0.35 * width || p.middle < margin || p.middle > lesson.end - 1 - margin;
   });
   std::ranges::sort(pupils, {}, &Pupil::rank);
   if (pupils.size() > most) pupils.resize(most);
