@@ -14,7 +14,7 @@ enum ExitCode {
   cannot_read = 4,     ///< a file is missing, unreadable or cut short
   cannot_write = 5,    ///< an output could not be written
   no_result = 6,       ///< the input is sound but nothing could be measured from it
-  limit_exceeded = 7,  ///< the acceptance test was done and written, and a limit is not kept
+  limit_exceeded = 7,  ///< a test was done and its answer is no: acceptance, or check
 };
 
 /// Ends a run whose answer is that a limit is not kept.
