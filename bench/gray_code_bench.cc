@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "bench/comparison.h"
 #include "bench/peers.h"
+#include "pagesweep/base/local_plane.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/camera/ray_table.h"
 #include "pagesweep/io/capture_file.h"
@@ -15,17 +17,39 @@
 namespace pagesweep::bench {
 namespace {
 
-std::int64_t match_by_sequence(const StereoFrames& frames) {
+/// \return depths of the points of the first camera [mm], whose frame is the rig's; NaN where there is no point
+Image<float> match_by_sequence(const StereoFrames& frames) {
   const RayTable first(frames.first_camera), second(frames.second_camera);
   const MatchPair matches = match_sequences(frames.first, frames.second, first, second);
-  const PointMap points = triangulate(matches.from_first, {}, first, second);
-  return std::ranges::count(points.status.pixels(), PixelStatus::ok);
+  return triangulate(matches.from_first, {}, first, second).z;
+}
+
+double count_points(const Image<float>& depths) {
+  return static_cast<double>(std::ranges::count_if(depths.pixels(), [](float z) { return std::isfinite(z); }));
+}
+
+/// How far points are from the robust plane through the 9 x 9 pixels around them, median [mm]: their scatter, and what
+/// the surface bends within nine pixels. Without a truth this is what can be told of the points' error.
+double scatter(const Image<float>& depths) {
+  constexpr int stride = 5, radius = 4;
+  std::vector<float> distances;
+  Neighbourhood around;
+  for (int y = 0; y < depths.height(); y += stride)
+    for (int x = 0; x < depths.width(); x += stride) {
+      if (!std::isfinite(depths(x, y))) continue;
+      around.gather(depths, x, y, radius);
+      if (const auto plane = around.fit_robustly()) distances.push_back(std::abs(plane->middle));
+    }
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  if (middle == distances.end()) return not_a_number;
+  std::ranges::nth_element(distances, middle);
+  return *middle;
 }
 
 /// Points a second.
-std::vector<double> rates(std::int64_t points, const std::vector<double>& seconds) {
+std::vector<double> rates(const Image<float>& depths, const std::vector<double>& seconds) {
   std::vector<double> values;
-  for (const double s : seconds) values.push_back(static_cast<double>(points) / s * 1e-6);
+  for (const double s : seconds) values.push_back(count_points(depths) / s * 1e-6);
   return values;
 }
 
@@ -33,7 +57,7 @@ void compare(const StereoFrames& frames, int threads, const Settings& settings, 
   constexpr double near_mm = 600, far_mm = 1500;  // what StereoSGBM has to be told, the other two find out
   const ThreadLimit limit(threads);
   limit_peer_threads(threads);
-  std::int64_t ours = 0, decoded = 0, block_matched = 0;
+  Image<float> ours, decoded, block_matched;
   const int white = frames.first.count() - 2;
   const std::vector<Way> ways = {{[&] { ours = match_by_sequence(frames); }},
                                  {[&] { decoded = decode_gray_code(frames); }},
@@ -49,14 +73,15 @@ void compare(const StereoFrames& frames, int threads, const Settings& settings, 
   report.add({"OpenCV StereoSGBM: points a second" + with, "million", rates(block_matched, seconds[2])});
   report.add({"sequence matcher over GrayCodePattern, time" + with, "", ratios(seconds[0], seconds[1]), 1});
   if (threads != 1) return;
-  report.add({"sequence matcher: pixels of camera 1 with a point", "", {static_cast<double>(ours)}});
-  report.add({"OpenCV GrayCodePattern: pixels of camera 1 with a point", "", {static_cast<double>(decoded)}});
-  report.add({"OpenCV StereoSGBM: pixels of camera 1 with a point", "", {static_cast<double>(block_matched)}});
-  report.add({"sequence matcher over GrayCodePattern, points",
-              "",
-              {static_cast<double>(ours) / static_cast<double>(decoded)},
-              1,
-              true});
+  const auto add_result = [&](const std::string& who, const Image<float>& depths) {
+    report.add({who + ": pixels of camera 1 with a point", "", {count_points(depths)}});
+    report.add({who + ": scatter of the points' depths, median", "mm", {scatter(depths)}});
+  };
+  add_result("sequence matcher", ours);
+  add_result("OpenCV GrayCodePattern", decoded);
+  add_result("OpenCV StereoSGBM", block_matched);
+  const double points_ratio = count_points(ours) / count_points(decoded);
+  report.add({"sequence matcher over GrayCodePattern, points", "", {points_ratio}, 1, true});
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "bench/peers.h"
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/data/time_map.h"
 
 namespace pagesweep::bench {
 namespace {
@@ -50,17 +51,17 @@ class Rectification {
   cv::Mat first(const cv::Mat& picture) const { return apply(picture, 0); }
   cv::Mat second(const cv::Mat& picture) const { return apply(picture, 2); }
   double disparity_at(double depth_mm) const { return pixels_times_mm_ / depth_mm; }
-  /// How many disparities give a point in front of the cameras. 0 stands for none.
-  std::int64_t count_points(const cv::Mat& disparity) const {
+  /// Depths of the points in front of the cameras [mm]. Disparity 0 stands for none.
+  Image<float> depths(const cv::Mat& disparity) const {
     cv::Mat points;
     cv::reprojectImageTo3D(disparity, points, depth_from_disparity_);
-    std::int64_t count = 0;
+    Image<float> depths(points.cols, points.rows, not_a_number);
     for (int y = 0; y < points.rows; ++y)
       for (int x = 0; x < points.cols; ++x) {
-        const auto& point = points.at<cv::Vec3f>(y, x);
-        count += disparity.at<float>(y, x) != 0 && std::isfinite(point[2]) && point[2] > 0;
+        const float depth = points.at<cv::Vec3f>(y, x)[2];
+        if (disparity.at<float>(y, x) != 0 && std::isfinite(depth) && depth > 0) depths(x, y) = depth;
       }
-    return count;
+    return depths;
   }
 
  private:
@@ -89,7 +90,7 @@ void limit_peer_threads(int threads) { cv::setNumThreads(threads == 0 ? -1 : thr
 
 /// The code tells columns only. OpenCV averages all pixels that have a code, so each row is decoded by itself; and it
 /// wants a code of the rows, which black and white give: that of row 0.
-std::int64_t decode_gray_code(const StereoFrames& frames) {
+Image<float> decode_gray_code(const StereoFrames& frames) {
   const Rectification rectification(frames.first_camera, frames.second_camera);
   const int count = frames.first.count();
   Pictures first, second;
@@ -113,10 +114,10 @@ std::int64_t decode_gray_code(const StereoFrames& frames) {
     cv::Mat out = disparity.row(y);
     shift.convertTo(out, CV_32F, -1);
   });
-  return rectification.count_points(disparity);
+  return rectification.depths(disparity);
 }
 
-std::int64_t match_blocks(const StereoFrames& frames, int frame, double near_mm, double far_mm) {
+Image<float> match_blocks(const StereoFrames& frames, int frame, double near_mm, double far_mm) {
   const Rectification rectification(frames.first_camera, frames.second_camera);
   const cv::Mat first = rectification.first(picture_of(frames.first, frame));
   const cv::Mat second = rectification.second(picture_of(frames.second, frame));
@@ -129,7 +130,7 @@ std::int64_t match_blocks(const StereoFrames& frames, int frame, double near_mm,
   matcher->compute(first, second, sixteenths);
   sixteenths.convertTo(disparity, CV_32F, 1.0 / 16);
   disparity.setTo(0, disparity < least);  // one below stands for none
-  return rectification.count_points(disparity);
+  return rectification.depths(disparity);
 }
 
 }  // namespace pagesweep::bench

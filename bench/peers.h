@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
-#include <optional>
-
+#include "pagesweep/base/image.h"
 #include "pagesweep/camera/camera.h"
 #include "pagesweep/data/frames.h"
 
@@ -24,11 +22,11 @@ bool has_peers();
 void limit_peer_threads(int threads);
 
 /// OpenCV's GrayCodePattern: the pictures are rectified, decoded, and their pixels of equal code become points.
-/// \return how many pixels of the first camera have a point
-std::int64_t decode_gray_code(const StereoFrames& frames);
+/// \return for the pixels of the first camera, rectified, their points' depths [mm]; NaN where there is no point
+Image<float> decode_gray_code(const StereoFrames& frames);
 
 /// OpenCV's StereoSGBM of one pair of frames: rectified, matched over the depths given, made points.
-/// \return how many pixels of the first camera have a point
-std::int64_t match_blocks(const StereoFrames& frames, int frame, double near_mm, double far_mm);
+/// \return as decode_gray_code()
+Image<float> match_blocks(const StereoFrames& frames, int frame, double near_mm, double far_mm);
 
 }  // namespace pagesweep::bench
