@@ -27,6 +27,9 @@ Eigen::Matrix2d BrownConrady::jacobian(const Eigen::Vector2d& ideal) const {
 bool BrownConrady::is_valid_at(double radius_squared) const {
   // d/dr of r (1 + k1 q + k2 q^2 + k3 q^3), q = r^2, is the cubic below; it must be positive on all of [0, q]: at the
   // far end and at those of its own extrema that lie between.
+  const double least =
+      1 - radius_squared * (3 * std::abs(k1) + radius_squared * (5 * std::abs(k2) + radius_squared * 7 * std::abs(k3)));
+  if (least > 0) return true;  // whatever the signs: the usual case
   const auto slope = [&](double q) { return 1 + q * (3 * k1 + q * (5 * k2 + q * 7 * k3)); };
   if (!(slope(radius_squared) > 0)) return false;
   const auto holds_at = [&](double q) { return !(q > 0 && q < radius_squared) || slope(q) > 0; };

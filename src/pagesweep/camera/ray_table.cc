@@ -11,27 +11,44 @@
 namespace pagesweep {
 namespace {
 
-/// Two Newton steps from a neighbouring direction; full inversion where that is not enough.
-Eigen::Vector2d undistort_from(const BrownConrady& lens, const Eigen::Vector2d& distorted, Eigen::Vector2d guess) {
-  for (int i = 0; i < 2 && guess.allFinite(); ++i)
-    guess -= lens.jacobian(guess).inverse() * (lens.distort(guess) - distorted);
-  const bool near = (lens.distort(guess) - distorted).squaredNorm() < 1e-24 && lens.is_valid_at(guess.squaredNorm());
-  if (near) return guess;
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  return lens.undistort(distorted).value_or(Eigen::Vector2d(nan, nan));
-}
+/// Inverts the distortion along a row of pixels.
+class RowUndistorter {
+ public:
+  explicit RowUndistorter(const BrownConrady& lens) : lens_(lens) {}
+
+  /// A Newton step from where the two pixels before let expect it; full inversion where that is not enough.
+  Eigen::Vector2d operator()(const Eigen::Vector2d& distorted) {
+    Eigen::Vector2d ideal = 2 * before_ - before_that_;
+    ideal -= lens_.jacobian(ideal).inverse() * (lens_.distort(ideal) - distorted);
+    const bool near = (lens_.distort(ideal) - distorted).squaredNorm() < 1e-24;
+    if (!near || !is_valid_at(ideal.squaredNorm())) {
+      constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+      ideal = lens_.undistort(distorted).value_or(Eigen::Vector2d(nan, nan));
+    }
+    before_that_ = before_;
+    before_ = ideal;
+    return ideal;
+  }
+
+ private:
+  /// What is valid at a radius is valid within.
+  bool is_valid_at(double radius_squared) {
+    if (radius_squared > known_as_valid_ && lens_.is_valid_at(radius_squared)) known_as_valid_ = radius_squared;
+    return radius_squared <= known_as_valid_;
+  }
+
+  const BrownConrady& lens_;
+  double known_as_valid_ = -1;  ///< largest squared radius
+  Eigen::Vector2d before_{0, 0}, before_that_{0, 0};
+};
 
 }  // namespace
 
 RayTable::RayTable(const Camera& camera) : camera_(camera), directions_(camera.width, camera.height) {
   parallel_rows(camera.height, [&](int y) {
-    Eigen::Vector2d guess(-camera.cx / camera.fx, (y - camera.cy) / camera.fy);
-    for (int x = 0; x < camera.width; ++x) {
-      const Eigen::Vector2d distorted((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy);
-      guess = undistort_from(camera.distortion, distorted, guess);
-      directions_(x, y) = guess;
-      guess.x() += 1 / camera.fx;
-    }
+    RowUndistorter undistort(camera.distortion);
+    for (int x = 0; x < camera.width; ++x)
+      directions_(x, y) = undistort({(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy});
   });
 }
 
