@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/footprint/weigh_footprints.h"
 
-#include <Eigen/Core>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,6 +13,7 @@
 
 #include "pagesweep/base/local_plane.h"
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/footprint/spot_sums_internal.h"
 
 namespace pagesweep {
 namespace {
@@ -96,43 +97,12 @@ std::optional<ScanPatch> patch_around(const ScanPositions& positions, Neighbourh
   return patch;
 }
 
-/// Places on a disc of three standard deviations, and their weights.
-struct Spot {
-  struct Place {
-    Eigen::Vector2f offset_px;
-    float weight;
-  };
-  std::vector<Place> places;
-
-  explicit Spot(double variance_px2) {
-    constexpr int steps = 6;  // on either side: half a standard deviation apart
-    const auto step = static_cast<float>(0.5 * std::sqrt(variance_px2));
-    for (int j = -steps; j <= steps; ++j)
-      for (int i = -steps; i <= steps; ++i)
-        if (const int square = i * i + j * j; square <= steps * steps)
-          places.push_back({Eigen::Vector2f(i, j) * step, std::exp(-0.125f * static_cast<float>(square))});
-  }
-};
-
-/// Bilinear; NaN outside.
-float sample(const Image<float>& light, const Eigen::Vector2f& position) {
-  const float left = std::floor(position.x()), top = std::floor(position.y());
-  if (!(left >= 0 && top >= 0 && left < static_cast<float>(light.width() - 1) &&
-        top < static_cast<float>(light.height() - 1)))
-    return not_a_number;
-  const float a = position.x() - left, b = position.y() - top;
-  const float* upper = &light(static_cast<int>(left), static_cast<int>(top));
-  const float* lower = upper + light.width();
-  const float above = upper[0] + a * (upper[1] - upper[0]), below = lower[0] + a * (lower[1] - lower[0]);
-  return above + b * (below - above);
-}
-
 /// The lowest and highest light around every place of the scan, for a quick answer to whether something is printed.
 class Contrast {
  public:
   /// \param reach_px  of the surroundings, at least
   Contrast(const Image<float>& light, float reach_px)
-      : side_(std::max(1, static_cast<int>(std::ceil(reach_px)))),
+      : side_(std::max(1, static_cast<int>(std::ceil(reach_px / blocks)))),
         low_((light.width() + side_ - 1) / side_, (light.height() + side_ - 1) / side_),
         high_(low_.width(), low_.height()) {
     Image<float> low(low_.width(), low_.height()), high = low;
@@ -142,7 +112,8 @@ class Contrast {
     });
     parallel_rows(low.height(), [&](int row) {
       for (int column = 0; column < low.width(); ++column)
-        std::tie(low_(column, row), high_(column, row)) = range_of(low, high, column - 1, row - 1, 3);
+        std::tie(low_(column, row), high_(column, row)) =
+            range_of(low, high, column - blocks, row - blocks, 2 * blocks + 1);
     });
   }
 
@@ -154,6 +125,8 @@ class Contrast {
   }
 
  private:
+  static constexpr int blocks = 2;  ///< in reach, on either side
+
   /// Over a square of pixels, as far as it lies inside.
   static std::pair<float, float> range_of(const Image<float>& low, const Image<float>& high, int left, int top,
                                           int side) {
@@ -168,16 +141,36 @@ class Contrast {
   Image<float> low_, high_;
 };
 
-/// NaN if a place is outside the scan or all of them are black.
-Eigen::Vector2f middle_of(const Spot& spot, const ScanPatch& patch, const Image<float>& light) {
-  Eigen::Vector2f moment = Eigen::Vector2f::Zero();
-  float mass = 0;
-  for (const Spot::Place& place : spot.places) {
-    const float weight = place.weight * sample(light, patch.middle + patch.by_pixel * place.offset_px);
-    mass += weight;
-    moment += weight * place.offset_px;
-  }
-  return moment / mass;
+/// The middle of a spot of this variance [px^2], up to three standard deviations from its centre. NaN if it is not
+/// wholly in the scan, or all of it is black, or the camera sees the surface so edge-on that it is no paper.
+Eigen::Vector2f middle_of(float variance, const ScanPatch& patch, const Image<float>& light) {
+  constexpr float reach = 3, most_elongated = 100;
+  const Eigen::Vector2f unknown = Eigen::Vector2f::Constant(not_a_number);
+  const float determinant = std::abs(patch.by_pixel.determinant()), size = patch.by_pixel.norm();
+  if (!(size * size < most_elongated * determinant)) return unknown;
+  const float sigma_px = std::sqrt(variance), narrowest = sigma_px * determinant / size;  // or a little more
+  const Eigen::Vector2f extent = reach * sigma_px * patch.by_pixel.rowwise().norm();
+  const Eigen::Vector2f low = (patch.middle - extent).array().floor(), high = (patch.middle + extent).array().ceil();
+  // Whole vectors are read, up to the row behind the last one.
+  if (light.width() < 2 * spot_padding) return unknown;
+  const Eigen::Vector2f last(static_cast<float>(light.width() - 1), static_cast<float>(light.height() - 3));
+  if (!(low.minCoeff() >= 0 && (last - high).minCoeff() >= 0)) return unknown;
+  const Eigen::Vector2f middle = patch.middle - low;
+  const Eigen::Matrix2f from_scan = patch.by_pixel.inverse();
+  const Eigen::Matrix2f precision = from_scan.transpose() * from_scan / variance;
+  const GaussianSpot spot{.u = middle.x(),
+                          .v = middle.y(),
+                          .uu = precision(0, 0),
+                          .uv = precision(0, 1),
+                          .vv = precision(1, 1),
+                          .most = reach * reach,
+                          .columns = static_cast<int>(high.x() - low.x()) + 1,
+                          .rows = static_cast<int>(high.y() - low.y()) + 1,
+                          .parts = static_cast<int>(std::ceil(std::clamp(1 / narrowest, 1.0f, 16.0f))),
+                          .row_step = static_cast<int>(std::max(1.0f, narrowest / 2))};
+  const float* corner = &light(static_cast<int>(low.x()), static_cast<int>(low.y()));
+  const SpotSums sums = sum_spot({corner, light.width()}, spot);
+  return from_scan * Eigen::Vector2f(sums.u, sums.v) / sums.light;
 }
 
 }  // namespace
@@ -189,7 +182,6 @@ SpotOffsets weigh_footprints(const PointMap& points, const Scanner& scanner, con
   if (!(spot_variance_px2 > 0)) throw std::invalid_argument("weigh_footprints: the spot's variance must be above 0");
   const Image<float> light = light_of(scan);
   const ScanPositions positions = project(points, scanner);
-  const Spot spot(spot_variance_px2);
   const auto sigma_px = static_cast<float>(std::sqrt(spot_variance_px2));
   const float usual_px = 3 * sigma_px * typical_step(positions);
   const Contrast contrast(light, 1.5f * usual_px);
@@ -206,7 +198,7 @@ SpotOffsets weigh_footprints(const PointMap& points, const Scanner& scanner, con
       }
       const auto patch = patch_around(positions, around, x, y);
       if (!patch) continue;
-      const Eigen::Vector2f middle = middle_of(spot, *patch, light);
+      const Eigen::Vector2f middle = middle_of(static_cast<float>(spot_variance_px2), *patch, light);
       offsets.dx(x, y) = middle.x();
       offsets.dy(x, y) = middle.y();
     }
