@@ -141,6 +141,35 @@ void add_lanes(const Weight* lanes, int pixels, Weight* sums) {
   }
 }
 
+#if HWY_TARGET != HWY_SCALAR
+/// The same for gray pixels of eight lanes, eight pixels at a time, so that no vector is left with a single sum. In
+/// fixed point the order of a sum does not matter.
+void add_eight_lanes(const std::int16_t* lanes, int count, std::int16_t* sums) {
+  const hn::Full128<std::int16_t> d;
+  const hn::Full128<std::int32_t> pairs;
+  const hn::Full128<std::int64_t> fours;
+  // Of vectors that hold several pixels' sums side by side, each in as many parts: twice the pixels, half the parts.
+  const auto merge = [&](auto as, auto a, auto b) {
+    const auto x = hn::BitCast(as, a), y = hn::BitCast(as, b);
+    return hn::Add(hn::BitCast(d, hn::InterleaveLower(as, x, y)), hn::BitCast(d, hn::InterleaveUpper(as, x, y)));
+  };
+  for (int k = 0; k < count; k += 8) {
+    const auto pixel = [&](int i) { return hn::LoadU(d, lanes + 8 * (k + i)); };
+    const auto two = [&](int i) { return merge(d, pixel(i), pixel(i + 1)); };
+    const auto four = [&](int i) { return merge(pairs, two(i), two(i + 2)); };
+    hn::StoreU(merge(fours, four(0), four(4)), d, sums + k);
+  }
+}
+#endif
+
+template <int Channels, class Weight>
+void add_all_lanes(const Weight* lanes, const LaneLayout& layout, int pixels, int count, Weight* sums) {
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (Channels == 1 && std::is_same_v<Weight, std::int16_t>) return add_eight_lanes(lanes, count, sums);
+#endif
+  for (int k = 0; k < count; ++k) add_lanes<Channels>(lanes + k * layout.lanes, pixels, sums + k * Channels);
+}
+
 /// Sums to samples, rounded and clipped. Reads and writes whole vectors.
 template <class T>
 void store_samples(const float* sums, int count, T* out) {
@@ -173,7 +202,7 @@ void sum_run(const ResampleRun<T, Weight>& run) {
   alignas(64) T samples[Lookups::most * Channels + slack];
   for (int k = 0; k < run.count; ++k) sum_pixel(d, run, layout, k, lanes + k * layout.lanes);
   const int pixels = std::min(run.across->taps(), layout.pixels);
-  for (int k = 0; k < run.count; ++k) add_lanes<Channels>(lanes + k * layout.lanes, pixels, sums + k * Channels);
+  add_all_lanes<Channels>(lanes, layout, pixels, run.count, sums);
   store_samples(sums, run.count * Channels, samples);
   std::copy_n(samples, run.count * Channels, run.out);
 }
