@@ -47,8 +47,10 @@ bool is_confirmed(const Correspondences& matches, const Correspondences& back, i
   if (found == 0) return out_of_view == 4;
   // With all four corners the steps cancel; one that is missing leaves up to a pixel of foreshortening in doubt.
   const double doubt = found == 4 ? 0 : 0.5;
-  const double tolerance = std::max(max_px, 4 * std::hypot(matches.sigma(x, y), sigma / weights)) + doubt;
-  return std::hypot(du, dv) <= tolerance * weights;
+  const double own_sigma = matches.sigma(x, y), their_sigma = sigma / weights;
+  const double sigmas = 4 * std::sqrt(own_sigma * own_sigma + their_sigma * their_sigma);
+  const double tolerance = (std::max(max_px, sigmas) + doubt) * weights;
+  return du * du + dv * dv <= tolerance * tolerance;
 }
 
 void mark(const Correspondences& matches, const Correspondences& back, double max_px, Image<PixelStatus>& status) {

@@ -58,6 +58,22 @@ View::View(const RayTable& rays)
   highest_ += border;
 }
 
+std::optional<CurveTangent> View::locate(const Eigen::Vector3d& point, const Eigen::Vector3d& change) const {
+  if (!(point.z() > 0)) return std::nullopt;
+  const double scale = 1 / point.z(), x = scale * point.x(), y = scale * point.y();
+  const double dx = scale * (change.x() - x * change.z()), dy = scale * (change.y() - y * change.z());
+  const double r2 = x * x + y * y, half_dr2 = x * dx + y * dy, dxy = x * dy + y * dx;
+  if (!(r2 <= max_radius_squared_)) return std::nullopt;
+  const double radial = 1 + r2 * (lens_.k1 + r2 * (lens_.k2 + r2 * lens_.k3));
+  const double dradial = 2 * half_dr2 * (lens_.k1 + r2 * (2 * lens_.k2 + r2 * 3 * lens_.k3));
+  const double u = fx_ * (x * radial + 2 * lens_.p1 * x * y + lens_.p2 * (r2 + 2 * x * x)) + cx_;
+  const double v = fy_ * (y * radial + lens_.p1 * (r2 + 2 * y * y) + 2 * lens_.p2 * x * y) + cy_;
+  if (!(u >= -0.5 && v >= -0.5 && u <= max_u_ && v <= max_v_)) return std::nullopt;
+  const double du = dx * radial + x * dradial + 2 * (lens_.p1 * dxy + lens_.p2 * (half_dr2 + 2 * x * dx));
+  const double dv = dy * radial + y * dradial + 2 * (lens_.p1 * (half_dr2 + 2 * y * dy) + lens_.p2 * dxy);
+  return CurveTangent{{u, v}, {fx_ * du, fy_ * dv}};
+}
+
 LensNumbers View::lens() const {
   const auto f = [](double value) { return static_cast<float>(value); };
   return {f(fx_),      f(fy_),      f(cx_),      f(cy_),      f(lens_.k1),

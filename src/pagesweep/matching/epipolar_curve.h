@@ -21,6 +21,12 @@ struct InverseDepthRange {
   bool empty() const { return !(far < near); }
 };
 
+/// A place of a curve, and its direction.
+struct CurveTangent {
+  Eigen::Vector2d pixel;   ///< [px]
+  Eigen::Vector2d change;  ///< [px mm] a unit of inverse depth
+};
+
 /// A camera that is looked into, made ready to project a million points.
 class View {
  public:
@@ -38,6 +44,9 @@ class View {
     if (!(u >= -0.5 && v >= -0.5 && u <= max_u_ && v <= max_v_)) return std::nullopt;
     return Eigen::Vector2d(u, v);
   }
+
+  /// The same, and how the picture moves when the point moves by `change`.
+  std::optional<CurveTangent> locate(const Eigen::Vector3d& point, const Eigen::Vector3d& change) const;
 
   double focal_length_px() const { return fx_; }
   LensNumbers lens() const;
@@ -68,6 +77,7 @@ class EpipolarCurve {
   const View& view() const { return *view_; }
   /// [px] in the other picture; nothing if it does not show that point.
   std::optional<Eigen::Vector2d> at(double inverse_depth) const { return view_->locate(a_ + inverse_depth * b_); }
+  std::optional<CurveTangent> tangent(double inverse_depth) const { return view_->locate(a_ + inverse_depth * b_, b_); }
   /// Pixels a unit of inverse depth [px mm], the lens taken as ideal: for the choice of steps.
   double speed(double inverse_depth) const {
     const Eigen::Vector3d p = a_ + inverse_depth * b_;
@@ -99,6 +109,12 @@ class EpipolarGeometry {
   /// \param from   must outlive this
   /// \param range  of depths in `from`
   EpipolarGeometry(const RayTable& from, const RayTable& to, InverseDepthRange range);
+  /// The same for another range.
+  EpipolarGeometry within(InverseDepthRange range) const {
+    EpipolarGeometry geometry = *this;
+    geometry.range_ = range;
+    return geometry;
+  }
   EpipolarCurve curve(int x, int y) const;
   /// A pixel's direction (X/Z, Y/Z, 1), turned into the other camera's frame; NaN where the distortion has no inverse.
   Eigen::Vector3d direction(int x, int y) const {

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/matching/match_sequences.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <span>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -17,122 +21,221 @@
 namespace pagesweep {
 namespace {
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr std::size_t pixels_at_once = 4 * PlaceBatch::most;
 
-/// Sum of squared differences (eq. 1), given up where it exceeds `limit`.
-float squared_difference(const std::int16_t* a, const std::int16_t* b, int length, float limit) {
-  constexpr int block = 64;  // so many squares of SequenceStore's samples fit into 32 bits
-  float sum = 0;
-  for (int begin = 0; begin < length; begin += block) {
-    const int end = std::min(length, begin + block);
-    std::int32_t part = 0;
-    for (int i = begin; i < end; ++i) {
-      const auto d = static_cast<std::int16_t>(a[i] - b[i]);
-      part += static_cast<std::int32_t>(d) * d;
-    }
-    sum += static_cast<float>(part);
-    if (sum > limit) return infinity;
+/// An epipolar curve as an ideal lens would show it: straight, with places about a pixel apart.
+struct SampledCurve {
+  CurveLine line{};
+  double far = 0, near = 0;      ///< [1/mm] at both ends
+  double z_far = 1, z_near = 1;  ///< of the points there, up to a common scale
+
+  SampledCurve() = default;
+  SampledCurve(const EpipolarCurve& curve, const LensNumbers& lens) : far(curve.range().far), near(curve.range().near) {
+    const Eigen::Vector3d start = curve.direction() + far * curve.origin();
+    const Eigen::Vector3d end = curve.direction() + near * curve.origin();
+    z_far = start.z();
+    z_near = end.z();
+    const Eigen::Vector2d first = start.hnormalized(), way = end.hnormalized() - first;
+    const int steps =
+        std::max(1, static_cast<int>(std::ceil(Eigen::Vector2d(lens.fx * way.x(), lens.fy * way.y()).norm())));
+    const Eigen::Vector2f step = (way / steps).cast<float>();
+    line = {static_cast<float>(first.x()), static_cast<float>(first.y()), step.x(), step.y(), steps + 1};
   }
-  return sum;
-}
 
-/// A place that may be the match.
-struct Candidate {
-  int sample;  ///< of the curve
-  SequenceFit fit;
+  /// [1/mm] What is even in the picture is not in depth: a mixture of homogeneous points weighs them by their z.
+  double inverse_depth(double place) const {
+    const double share = place / (line.count - 1);
+    const double weight_near = share * z_far, weight_far = (1 - share) * z_near;
+    return (weight_far * far + weight_near * near) / (weight_far + weight_near);
+  }
 };
 
-/// Finds the least squared difference along epipolar curves: first among the pixels nearest to the curve, then between
-/// pixels, around every pixel that might come to lead.
+/// A pixel that looks for its match.
+struct Seeker {
+  int x = 0, y = 0;
+  SampledCurve curve;
+  double energy = 0;                         ///< of its sequence, in the store's own units
+  std::vector<std::int32_t> pixels, scores;  ///< of the curve's places, see ScoredCurve
+  std::vector<CurveMinimum> minima;
+  std::span<const CurveMinimum> promising;  ///< the best ones of the minima, in order
+  std::size_t next = 0;                     ///< of the minima
+  SequenceFit best;
+  bool has_best = false;
+  int place_of_best = 0;
+  double sigma_px = 0;  ///< of the best
+  std::optional<Match> verdict;
+
+  /// \return the first score, behind a highest one
+  std::int32_t* make_room(int count) {
+    const auto room = static_cast<std::size_t>(count) + 2 * score_padding;
+    if (pixels.size() < room) {
+      pixels.resize(room);
+      scores.resize(room);
+      minima.resize(room);
+    }
+    scores[score_padding - 1] = std::numeric_limits<std::int32_t>::max();
+    return scores.data() + score_padding;
+  }
+  /// Whether there is a place that may lead. \param slack  of the energy, that its distance may be too large
+  bool has_more(double slack) const {
+    if (next == promising.size()) return false;
+    return !has_best || promising[next].distance_squared <= best.distance_squared + slack * energy;
+  }
+  std::span<const std::int32_t> scores_between(int first, int last) const {
+    return std::span(scores).subspan(static_cast<std::size_t>(score_padding + first),
+                                     static_cast<std::size_t>(last - first + 1));
+  }
+};
+
+/// Finds the least squared difference along epipolar curves, for some pixels at once: first among the pixels nearest to
+/// the curve, then between pixels, around every pixel that might come to lead.
 class SequenceFinder final : public MatchFinder {
  public:
   SequenceFinder(const SequenceStore& from, const SequenceStore& to, const MatchOptions& options)
-      : from_(from), to_(to), options_(options), fitter_(from, to, options) {}
+      : from_(from),
+        to_arrays_(to.arrays()),
+        options_(options),
+        affine_(options.normalisation == Normalisation::affine),
+        fitter_(from, to, options) {
+    curves_.reserve(pixels_at_once);
+  }
 
   Match find(int x, int y, const EpipolarCurve& curve, double) override {
-    sample(curve, samples_);
-    scan(x, y);
-    fit_minima(x, y, curve);
-    const double energy = from_.energy(x, y);
-    const auto best = std::min_element(candidates_.begin(), candidates_.end(), [](const auto& a, const auto& b) {
-      return a.fit.distance_squared < b.fit.distance_squared;
-    });
-    if (best == candidates_.end() || best->fit.distance_squared > options_.max_dissimilarity * energy)
-      return Match::none(has_view() ? PixelStatus::no_match : PixelStatus::outside_view);
-    const bool rivalled = std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& other) {
-      return is_rival(other, *best, options_.min_distinction * energy);
-    });
-    if (rivalled || !(best->fit.sigma_px <= options_.max_sigma_px)) return Match::none(PixelStatus::ambiguous);
-    return {PixelStatus::ok, best->fit.pixel, best->fit.sigma_px, best->fit.inverse_depth, not_a_number};
+    curves_.clear();
+    lens_ = curve.view().lens();
+    seek(x, y, curve);
+    decide();
+    return *seekers_[0].verdict;
   }
+
+  /// Matches the pixels (x, y), (x + 1, y), ..., at most pixels_at_once of them.
+  void find_run(int x, int y, const EpipolarGeometry& geometry, std::span<Match> matches);
 
  private:
-  /// By how much of the energy the nearest pixel, up to half a pixel away, may score worse than the place itself.
-  static constexpr double coarseness = 0.3;
+  /// By how much of the energy the pixels nearest to a curve, up to half a pixel from it, may score worse than the
+  /// curve itself; and by how much worse one of its places, up to half a pixel beside the best one.
+  static constexpr double across = 0.15, along = 0.15;
 
-  bool has_view() const {
-    return std::any_of(samples_.u.begin(), samples_.u.end(), [](float u) { return !std::isnan(u); });
-  }
-  void scan(int x, int y);
-  void fit_minima(int x, int y, const EpipolarCurve& curve);
-  bool is_rival(const Candidate& other, const Candidate& best, double margin) const;
+  void seek(int x, int y, const EpipolarCurve& curve);
+  void decide();
+  void hear(const SequenceFit& fit, Seeker& seeker) const;
+  Match judge(const Seeker& seeker) const;
+  bool is_rival(const SequenceFit& other, int place_of_other, const Seeker& seeker) const;
 
   const SequenceStore& from_;
-  const SequenceStore& to_;
+  SequenceArrays to_arrays_;
   const MatchOptions& options_;
+  bool affine_;
   SequenceFitter fitter_;
-  CurveSamples samples_;
-  std::vector<float> scores_;  ///< of the samples; infinity where one is no candidate, or clearly worse than another
-  std::vector<std::pair<float, std::size_t>> minima_;  ///< score and sample
-  std::vector<Candidate> candidates_;
+  LensNumbers lens_{};                 ///< of the other camera
+  std::vector<EpipolarCurve> curves_;  ///< of the seekers
+  std::array<Seeker, pixels_at_once> seekers_;
+  std::array<SequenceFit, pixels_at_once> fits_;
+  std::vector<Seeker*> asked_for_;  ///< by whom the fits were
 };
 
-/// Compares with the pixels nearest to the samples.
-void SequenceFinder::scan(int x, int y) {
-  const std::int16_t* own = from_.sequence(x, y);
-  const auto slack = static_cast<float>(coarseness * from_.energy(x, y));
-  float limit = static_cast<float>(options_.max_dissimilarity) * from_.energy(x, y) + slack;
-  scores_.assign(samples_.u.size(), infinity);
-  for (std::size_t i = 0; i < scores_.size(); ++i) {
-    if (std::isnan(samples_.u[i])) continue;
-    const int u = std::clamp(static_cast<int>(samples_.u[i] + 0.5f), 0, to_.width() - 1);
-    const int v = std::clamp(static_cast<int>(samples_.v[i] + 0.5f), 0, to_.height() - 1);
-    if (to_.status(u, v) != PixelStatus::ok) continue;
-    scores_[i] = squared_difference(own, to_.sequence(u, v), to_.length(), limit);
-    limit = std::min(limit, scores_[i] + slack);
-  }
-}
-
-/// Fits around the minima of the scores that may come to be the best, the most promising ones first.
-void SequenceFinder::fit_minima(int x, int y, const EpipolarCurve& curve) {
+/// Compares with the pixels nearest to the curve, and notes the most promising places.
+void SequenceFinder::seek(int x, int y, const EpipolarCurve& curve) {
   constexpr std::size_t most = 8;
-  minima_.clear();
-  candidates_.clear();
-  const auto score = [&](std::size_t i) { return i < scores_.size() ? scores_[i] : infinity; };
-  for (std::size_t i = 0; i < scores_.size(); ++i)
-    if (scores_[i] < score(i - 1) && scores_[i] <= score(i + 1)) minima_.push_back({scores_[i], i});
-  std::sort(minima_.begin(), minima_.end());
-  if (minima_.size() > most) minima_.resize(most);
-  const double slack = coarseness * from_.energy(x, y);
-  double least = minima_.empty() ? 0 : minima_[0].first;
-  for (const auto& [value, i] : minima_) {
-    if (value > least + slack) break;
-    const auto fit = fitter_.fit(x, y, curve, samples_.inverse_depth[i]);
-    if (!fit) continue;
-    candidates_.push_back({static_cast<int>(i), *fit});
-    least = std::min(least, fit->distance_squared);
+  Seeker& seeker = seekers_[curves_.size()];
+  curves_.push_back(curve);
+  seeker.x = x;
+  seeker.y = y;
+  seeker.curve = SampledCurve(curve, lens_);
+  seeker.energy = from_.energy(x, y);
+  seeker.next = 0;
+  seeker.has_best = false;
+  seeker.verdict.reset();
+  const int count = seeker.curve.line.count;
+  std::int32_t* scores = seeker.make_room(count);
+  const double least = score_curve(to_arrays_, lens_, seeker.curve.line, from_.sequence(x, y), from_.square(x, y),
+                                   seeker.pixels.data(), scores);
+  constexpr double largest = std::numeric_limits<std::int32_t>::max();
+  const double limit = std::min(least, options_.max_dissimilarity * seeker.energy) + (across + along) * seeker.energy;
+  const ScoredCurve scored{&to_arrays_, seeker.pixels.data(), scores, count, from_.square(x, y), affine_};
+  const int minima = find_minima(scored, static_cast<std::int32_t>(std::min(limit, largest)), seeker.minima.data());
+  const auto found = std::span(seeker.minima).first(static_cast<std::size_t>(minima));
+  std::ranges::sort(found, {}, &CurveMinimum::distance_squared);
+  seeker.promising = found.first(std::min(found.size(), most));
+}
+
+/// In rounds: fits each seeker's most promising place, until a verdict is found or no other place can change it.
+void SequenceFinder::decide() {
+  const auto seekers = std::span(seekers_).first(curves_.size());
+  for (asked_for_.clear();; asked_for_.clear()) {
+    for (Seeker& seeker : seekers) {
+      if (seeker.verdict) continue;
+      if (seeker.has_more(across)) {
+        const auto index = static_cast<std::size_t>(&seeker - seekers_.data());
+        const double depth = seeker.curve.inverse_depth(seeker.promising[seeker.next++].place);
+        fits_[asked_for_.size()].begin(seeker.x, seeker.y, curves_[index], depth);
+        asked_for_.push_back(&seeker);
+      } else {
+        seeker.verdict = judge(seeker);
+      }
+    }
+    if (asked_for_.empty()) return;
+    fitter_.fit(std::span(fits_).first(asked_for_.size()));
+    for (std::size_t k = 0; k < asked_for_.size(); ++k)
+      if (fits_[k].found) hear(fits_[k], *asked_for_[k]);
   }
 }
 
-/// Whether another place fits as well as the best one, within the margin, with worse ones in between: a wide minimum is
-/// no rivalry, it is a large sigma.
-bool SequenceFinder::is_rival(const Candidate& other, const Candidate& best, double margin) const {
+/// What a fit says about its seeker: it may be the best so far, or make it ambiguous.
+void SequenceFinder::hear(const SequenceFit& fit, Seeker& seeker) const {
+  const int place = static_cast<int>(seeker.promising[seeker.next - 1].place);
+  const bool has_rival = seeker.has_best && is_rival(fit, place, seeker);
+  if (!seeker.has_best || fit.distance_squared < seeker.best.distance_squared) {
+    seeker.best = fit;
+    seeker.has_best = true;
+    seeker.place_of_best = place;
+    seeker.sigma_px = fitter_.sigma_px(fit);
+  }
+  const bool matches = seeker.best.distance_squared <= options_.max_dissimilarity * seeker.energy;
+  if (matches && (has_rival || !(seeker.sigma_px <= options_.max_sigma_px)))
+    seeker.verdict = Match::none(PixelStatus::ambiguous);
+}
+
+/// When all places that may lead have been heard.
+Match SequenceFinder::judge(const Seeker& seeker) const {
+  if (seeker.has_best && seeker.best.distance_squared <= options_.max_dissimilarity * seeker.energy)
+    return {PixelStatus::ok, seeker.best.pixel, seeker.sigma_px, seeker.best.inverse_depth, not_a_number};
+  const auto places = std::span(seeker.pixels).first(static_cast<std::size_t>(seeker.curve.line.count));
+  const bool has_view = std::ranges::any_of(places, [&](std::int32_t p) { return p != to_arrays_.nowhere(); });
+  return Match::none(has_view ? PixelStatus::no_match : PixelStatus::outside_view);
+}
+
+/// Whether two places fit equally well, within the margin, with worse ones in between: a wide minimum is no rivalry, it
+/// is a large sigma.
+bool SequenceFinder::is_rival(const SequenceFit& other, int place, const Seeker& seeker) const {
   constexpr double same_px = 1.5;
-  if (other.fit.distance_squared > best.fit.distance_squared + margin) return false;
-  if ((other.fit.pixel - best.fit.pixel).norm() < same_px) return false;
-  const auto [begin, end] = std::minmax(other.sample, best.sample);
-  const float barrier = *std::max_element(scores_.begin() + begin, scores_.begin() + end);
-  return barrier > other.fit.distance_squared + margin;
+  const double margin = options_.min_distinction * seeker.energy;
+  const auto [less, more] = std::minmax(other.distance_squared, seeker.best.distance_squared);
+  if (more > less + margin || (other.pixel - seeker.best.pixel).norm() < same_px) return false;
+  const auto [begin, end] = std::minmax(place, seeker.place_of_best);
+  const std::int32_t barrier = std::ranges::max(seeker.scores_between(begin, end));
+  return barrier > more + margin;
+}
+
+void SequenceFinder::find_run(int x, int y, const EpipolarGeometry& geometry, std::span<Match> matches) {
+  curves_.clear();
+  lens_ = geometry.view().lens();
+  std::array<std::size_t, pixels_at_once> seeker;
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    const int column = x + static_cast<int>(k);
+    matches[k] = Match::none(from_.status(column, y));
+    if (matches[k].status != PixelStatus::ok) continue;
+    const EpipolarCurve curve = geometry.curve(column, y);
+    if (curve.range().empty()) {
+      matches[k] = Match::none(PixelStatus::outside_view);
+      continue;
+    }
+    seeker[k] = curves_.size();
+    seek(column, y, curve);
+  }
+  decide();
+  for (std::size_t k = 0; k < matches.size(); ++k)
+    if (matches[k].status == PixelStatus::ok) matches[k] = *seekers_[seeker[k]].verdict;
 }
 
 class SequenceMatcher final : public Matcher {
@@ -143,6 +246,17 @@ class SequenceMatcher final : public Matcher {
   PixelStatus status_of(int x, int y) const override { return from_.status(x, y); }
   std::unique_ptr<MatchFinder> make_finder() const override {
     return std::make_unique<SequenceFinder>(from_, to_, options_);
+  }
+  /// Along the rows: neighbours look at nearly the same pixels of the other camera.
+  void match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const override {
+    SequenceFinder finder(from_, to_, options_);
+    std::array<Match, pixels_at_once> run;
+    for (int y = top; y < bottom; ++y)
+      for (int x = 0; x < matches.width(); x += static_cast<int>(pixels_at_once)) {
+        const std::size_t count = std::min<std::size_t>(pixels_at_once, static_cast<std::size_t>(matches.width() - x));
+        finder.find_run(x, y, geometry, std::span(run).first(count));
+        for (std::size_t k = 0; k < count; ++k) put(run[k], x + static_cast<int>(k), y, matches);
+      }
   }
 
  private:

@@ -1,129 +1,231 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/matching/nearest_place.h"
 
-#include <algorithm>
-#include <cmath>
+#include <limits>
+#include <tuple>
+#include <utility>
 
-namespace pagesweep {
+// Not worth their time to compile beside SSE4, AVX2 and AVX-512.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pagesweep/matching/nearest_place.cc"
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace pagesweep::HWY_NAMESPACE {
 namespace {
+namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int crossings = SequenceProducts::crossings;
-/// An interpolated sequence S = sum of value_k S_(segment - 1 + k), and its change a crossing.
-struct Interpolated {
-  Eigen::Vector4d value, derivative;
+using Doubles = hn::CappedTag<double, PlaceBatch::most>;
+using Vector = hn::Vec<Doubles>;
+using Mask = hn::Mask<Doubles>;
+constexpr std::size_t crossings = PlaceBatch::crossings;
+
+Vector set(double value) { return hn::Set(Doubles(), value); }
+Vector zero() { return hn::Zero(Doubles()); }
+Vector square(Vector v) { return hn::Mul(v, v); }
+Vector clamp_share(Vector t) { return hn::Min(hn::Max(t, zero()), set(1)); }
+
+/// A place between the crossings 1 and 2.
+struct Place {
+  Vector share, distance_squared, gain;
 };
 
-Interpolated linear_at(double t) { return {{0, 1 - t, t, 0}, {0, -1, 1, 0}}; }
+Place select(Mask first, const Place& a, const Place& b) {
+  return {hn::IfThenElse(first, a.share, b.share), hn::IfThenElse(first, a.distance_squared, b.distance_squared),
+          hn::IfThenElse(first, a.gain, b.gain)};
+}
 
-/// Catmull-Rom spline.
-Interpolated cubic_at(double t) {
+struct Weights {
+  Vector value[crossings], change[crossings];
+};
+
+Weights linear_at(Vector t) { return {{zero(), hn::Sub(set(1), t), t, zero()}, {zero(), set(-1), set(1), zero()}}; }
+
+/// See cubic_weights().
+Weights cubic_at(Vector t) {
+  const auto parabola = [&](double c0, double c1, double c2) {
+    return hn::MulAdd(t, hn::MulAdd(t, set(c2), set(c1)), set(c0));
+  };
+  const Vector tt = hn::Mul(t, t);
+  return {{hn::Mul(t, parabola(-0.5, 1, -0.5)), hn::MulAdd(tt, hn::MulAdd(t, set(1.5), set(-2.5)), set(1)),
+           hn::Mul(t, parabola(0.5, 2, -1.5)), hn::Mul(tt, hn::MulAdd(t, set(0.5), set(-0.5)))},
+          {parabola(-0.5, 2, -1.5), parabola(0, -5, 4.5), parabola(0.5, 4, -4.5), parabola(0, -1, 1.5)}};
+}
+
+/// Some pixels of a batch.
+class Pixels {
+ public:
+  Pixels(const PlaceBatch& batch, std::size_t first, bool affine)
+      : batch_(batch), first_(first), affine_(affine), gg_(load(batch.gg)) {
+    for (std::size_t i = 0; i < crossings; ++i) {
+      gs_[i] = load(batch.gs[i]);
+      noise_share_[i] = load(batch.noise_share[i]);
+      for (std::size_t j = i; j < crossings; ++j) ss_[i][j] = ss_[j][i] = load(batch.ss[i][j]);
+    }
+  }
+
+  Mask has(std::size_t crossing) const { return hn::Gt(load(batch_.usable[crossing]), zero()); }
+  Vector load(const PlaceBatch::Each& values) const { return hn::Load(Doubles(), &values[first_]); }
+  void store(Vector v, PlaceBatch::Each& values) const { hn::Store(v, Doubles(), &values[first_]); }
+
+  /// Takes the noise's expected part off the crossings' squares, or adds it again.
+  void add_noise(Vector energy) {
+    for (std::size_t i = 0; i < crossings; ++i) ss_[i][i] = hn::MulAdd(energy, noise_share_[i], ss_[i][i]);
+  }
+
+  /// Variance of a sample of the other camera that explains the distance.
+  Vector noise_variance(const Place& place, const Weights& weights) const {
+    Vector shares = set(1);
+    for (std::size_t k = 0; k < crossings; ++k)
+      shares = hn::MulAdd(square(hn::Mul(place.gain, weights.value[k])), noise_share_[k], shares);
+    return hn::Div(place.distance_squared, hn::Mul(shares, set(batch_.freedom)));
+  }
+
+  /// Where the line through S_1 and S_2 comes nearest to g.
+  Place nearest_on_line() const {
+    const Vector g0 = gs_[1], g1 = gs_[2], s0 = ss_[1][1], s1 = ss_[2][2], s01 = ss_[1][2];
+    Vector t;
+    if (affine_) {  // g's coefficients in the plane, times a determinant
+      const Vector a = hn::MulSub(g0, s1, hn::Mul(g1, s01)), b = hn::MulSub(g1, s0, hn::Mul(g0, s01));
+      const Vector nearer = hn::IfThenElseZero(hn::Gt(g1, g0), set(1)), sum = hn::Add(a, b);
+      t = hn::IfThenElse(hn::Gt(sum, zero()), hn::Div(b, sum), nearer);
+    } else {
+      const Vector length_squared = hn::Add(hn::NegMulAdd(set(2), s01, s0), s1);
+      const Vector along = hn::Add(hn::Sub(g1, g0), hn::Sub(s0, s01));
+      t = hn::IfThenElseZero(hn::Gt(length_squared, zero()), hn::Div(along, length_squared));
+    }
+    t = clamp_share(t);
+    const Vector r = hn::Sub(set(1), t), rt = hn::Mul(set(2), hn::Mul(r, t));
+    const Vector ss = hn::MulAdd(square(r), s0, hn::MulAdd(square(t), s1, hn::Mul(rt, s01)));
+    return make_place(t, hn::MulAdd(r, g0, hn::Mul(t, g1)), ss);
+  }
+
+  /// Goes on along the spline.
+  Place polish(Vector share, Mask moving) const {
+    constexpr int steps = 4;
+    auto [here, step] = compare(share);
+    for (int i = 0; i < steps && !hn::AllFalse(Doubles(), moving); ++i) {
+      const Vector bounded = hn::Min(hn::Max(step, set(-0.5)), set(0.5));
+      const auto [there, next_step] = compare(clamp_share(hn::Add(here.share, bounded)));
+      moving = hn::And(moving, hn::Le(there.distance_squared, here.distance_squared));
+      const Mask arrived = hn::Lt(hn::Abs(step), set(1e-4));
+      here = select(moving, there, here);
+      step = hn::IfThenElse(moving, next_step, step);
+      moving = hn::AndNot(arrived, moving);
+    }
+    return here;
+  }
+
+  Vector distance_squared(const Weights& weights) const {
+    Vector gs = zero(), ss = zero();
+    for (std::size_t k = 0; k < crossings; ++k) {
+      gs = hn::MulAdd(gs_[k], weights.value[k], gs);
+      for (std::size_t j = 0; j < crossings; ++j)
+        ss = hn::MulAdd(hn::Mul(weights.value[k], weights.value[j]), ss_[k][j], ss);
+    }
+    return hn::Max(zero(), make_place(zero(), gs, ss).distance_squared);
+  }
+
+ private:
+  /// The distance of g and a sequence S with these scalar products g . S and S . S, scaled by the gain that suits it
+  /// best.
+  Place make_place(Vector share, Vector gs, Vector ss) const {
+    if (!affine_) return {share, hn::Add(hn::NegMulAdd(set(2), gs, gg_), ss), set(1)};
+    const Mask alike = hn::And(hn::Gt(gs, zero()), hn::Gt(ss, zero()));
+    const Vector gain = hn::IfThenElse(alike, hn::Div(gs, ss), set(1));
+    return {share, hn::IfThenElse(alike, hn::NegMulAdd(gs, gain, gg_), gg_), gain};
+  }
+
+  /// A place on the spline, and [crossings] how far it is from there to the least distance, by Gauss-Newton.
+  std::pair<Place, Vector> compare(Vector share) const {
+    const Weights weights = cubic_at(share);
+    Vector gs = zero(), gd = zero(), ss = zero(), sd = zero(), dd = zero();
+    for (std::size_t k = 0; k < crossings; ++k) {
+      Vector carried = zero(), changed = zero();
+      for (std::size_t j = 0; j < crossings; ++j) {
+        carried = hn::MulAdd(ss_[k][j], weights.value[j], carried);
+        changed = hn::MulAdd(ss_[k][j], weights.change[j], changed);
+      }
+      gs = hn::MulAdd(gs_[k], weights.value[k], gs);
+      gd = hn::MulAdd(gs_[k], weights.change[k], gd);
+      ss = hn::MulAdd(carried, weights.value[k], ss);
+      sd = hn::MulAdd(carried, weights.change[k], sd);
+      dd = hn::MulAdd(changed, weights.change[k], dd);
+    }
+    const Place place = make_place(share, gs, ss);
+    if (!affine_) return {place, hn::IfThenElseZero(hn::Gt(dd, zero()), hn::Div(hn::Sub(gd, sd), dd))};
+    const Vector across = hn::Sub(dd, hn::Div(square(sd), ss));
+    const Mask known = hn::And(hn::And(hn::Gt(gs, zero()), hn::Gt(ss, zero())), hn::Gt(across, zero()));
+    const Vector step = hn::Div(hn::NegMulAdd(place.gain, sd, gd), hn::Mul(place.gain, across));
+    return {place, hn::IfThenElseZero(known, step)};
+  }
+
+  const PlaceBatch& batch_;
+  std::size_t first_;
+  bool affine_;
+  Vector gg_, gs_[crossings], ss_[crossings][crossings], noise_share_[crossings];
+};
+
+void find_some(PlaceBatch& batch, std::size_t first, bool affine, bool wants_cubic) {
+  Pixels pixels(batch, first, affine);
+  const Place with_noise = pixels.nearest_on_line();
+  const Vector variance = pixels.noise_variance(with_noise, linear_at(with_noise.share));
+  Vector noise_energy = hn::Mul(variance, set(batch.samples));
+  pixels.add_noise(hn::Neg(noise_energy));
+  Place linear = pixels.nearest_on_line();
+  // Noise never moves a place by more; then it was something else that is not alike.
+  constexpr double farthest = 0.5;
+  const Mask unlikely = hn::Ge(hn::Abs(hn::Sub(linear.share, with_noise.share)), set(farthest));
+  linear = select(unlikely, with_noise, linear);
+  pixels.add_noise(hn::IfThenElseZero(unlikely, noise_energy));
+  noise_energy = hn::IfThenZeroElse(unlikely, noise_energy);
+  const Mask has_two = hn::And(pixels.has(1), pixels.has(2));
+  const Mask has_four = hn::And(has_two, hn::And(pixels.has(0), pixels.has(3)));
+  const Place cubic = pixels.polish(linear.share, has_four);
+  const Mask is_cubic = wants_cubic ? has_four : hn::MaskFromVec(zero());
+  // The place is found without noise, but its distance is what it is.
+  pixels.add_noise(noise_energy);
+  Place place = select(is_cubic, cubic, linear);
+  const Weights linear_weights = linear_at(place.share);
+  Weights weights = cubic_at(place.share);
+  for (std::size_t k = 0; k < crossings; ++k)
+    weights.value[k] = hn::IfThenElse(is_cubic, weights.value[k], linear_weights.value[k]);
+  place.distance_squared = pixels.distance_squared(weights);
+  pixels.store(place.distance_squared, batch.distance_squared);
+  pixels.store(pixels.noise_variance(place, weights), batch.noise_variance);
+  pixels.store(place.gain, batch.gain);
+  pixels.store(hn::IfThenElse(has_two, place.share, set(std::numeric_limits<double>::quiet_NaN())), batch.share);
+  pixels.store(hn::IfThenElseZero(is_cubic, set(1)), batch.is_cubic);
+  pixels.store(hn::IfThenElseZero(has_four, hn::Abs(hn::Sub(cubic.share, linear.share))), batch.doubt);
+}
+
+void FindNearestPlaces(PlaceBatch& batch, Normalisation normalisation, Interpolation interpolation) {
+  for (std::size_t first = 0; first < batch.count; first += hn::Lanes(Doubles()))
+    find_some(batch, first, normalisation == Normalisation::affine, interpolation == Interpolation::cubic);
+}
+
+}  // namespace
+}  // namespace pagesweep::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace pagesweep {
+
+HWY_EXPORT(FindNearestPlaces);
+
+void find_nearest_places(PlaceBatch& batch, Normalisation normalisation, Interpolation interpolation) {
+  HWY_DYNAMIC_DISPATCH(FindNearestPlaces)(batch, normalisation, interpolation);
+}
+
+CrossingWeights linear_weights(double share) { return {{0, 1 - share, share, 0}, {0, -1, 1, 0}}; }
+
+CrossingWeights cubic_weights(double t) {
   return {{0.5 * t * (-1 + t * (2 - t)), 1 + t * t * (-2.5 + 1.5 * t), 0.5 * t * (1 + t * (4 - 3 * t)),
            0.5 * t * t * (t - 1)},
           {0.5 * (-1 + t * (4 - 3 * t)), t * (-5 + 4.5 * t), 0.5 * (1 + t * (8 - 9 * t)), 0.5 * t * (3 * t - 2)}};
 }
 
-/// How well g and an interpolated sequence S agree. \tparam affine  S is scaled by the gain that suits it best
-struct Comparison {
-  double distance_squared, gain;
-  double step;  ///< [crossings] to the least distance, by Gauss-Newton
-};
-
-Comparison compare(const SequenceProducts& p, int segment, const Interpolated& s, bool affine) {
-  const Eigen::Vector4d g = p.gs.segment<4>(segment - 1);
-  const Eigen::Matrix4d products = p.ss.block<4, 4>(segment - 1, segment - 1);
-  const Eigen::Vector4d carried = products * s.value;
-  const double gs = s.value.dot(g), gd = s.derivative.dot(g), ss = s.value.dot(carried);
-  const double sd = s.derivative.dot(carried), dd = s.derivative.dot(products * s.derivative);
-  if (!affine) return {p.gg - 2 * gs + ss, 1, dd > 0 ? (gd - sd) / dd : 0};
-  if (!(gs > 0 && ss > 0)) return {p.gg, 1, 0};
-  const double gain = gs / ss, across = dd - sd * sd / ss;
-  return {p.gg - gs * gain, gain, across > 0 ? (gd - gain * sd) / (gain * across) : 0};
-}
-
-/// Where on the line through a segment the distance is least.
-double best_share(const SequenceProducts& p, int i, bool affine) {
-  const double s0 = p.ss(i, i), s1 = p.ss(i + 1, i + 1), s01 = p.ss(i, i + 1), g0 = p.gs[i], g1 = p.gs[i + 1];
-  if (!affine) {
-    const double length_squared = s0 - 2 * s01 + s1;
-    return length_squared > 0 ? (g1 - g0 + s0 - s01) / length_squared : 0;
-  }
-  const double a = g0 * s1 - g1 * s01, b = g1 * s0 - g0 * s01;  // g's coefficients in the plane, times a determinant
-  return a + b > 0 ? b / (a + b) : (g1 > g0 ? 1 : 0);
-}
-
-bool is_usable(const SequenceProducts& p, int i) {
-  return i >= 0 && i < crossings && p.usable[static_cast<std::size_t>(i)];
-}
-
-CurvePlace make_place(const SequenceProducts& p, int segment, double share, const Interpolated& s,
-                      const Comparison& comparison) {
-  const bool at_end = (share <= 0 && !is_usable(p, segment - 1)) || (share >= 1 && !is_usable(p, segment + 2));
-  return {segment,         share, at_end,  std::max(0.0, comparison.distance_squared),
-          comparison.gain, 0,     s.value, s.derivative};
-}
-
-bool has_four(const SequenceProducts& p, int segment) {
-  return is_usable(p, segment - 1) && is_usable(p, segment) && is_usable(p, segment + 1) && is_usable(p, segment + 2);
-}
-
-/// Moves on along the spline, from one segment to the next if need be.
-CurvePlace polish(const SequenceProducts& p, int segment, double share, bool affine) {
-  constexpr int steps = 4;
-  Interpolated interpolated = cubic_at(share);
-  Comparison here = compare(p, segment, interpolated, affine);
-  for (int i = 0; i < steps; ++i) {
-    int next = segment;
-    double next_share = share + std::clamp(here.step, -0.5, 0.5);
-    if (next_share < 0 && has_four(p, next - 1)) {
-      --next;
-      ++next_share;
-    } else if (next_share > 1 && has_four(p, next + 1)) {
-      ++next;
-      --next_share;
-    }
-    next_share = std::clamp(next_share, 0.0, 1.0);
-    const Interpolated moved = cubic_at(next_share);
-    const Comparison there = compare(p, next, moved, affine);
-    if (!(there.distance_squared <= here.distance_squared)) break;
-    const bool arrived = std::abs(here.step) < 1e-4;
-    segment = next;
-    share = next_share;
-    interpolated = moved;
-    here = there;
-    if (arrived) break;
-  }
-  return make_place(p, segment, share, interpolated, here);
-}
-
-}  // namespace
-
-CurvePlace nearest_on_polyline(const SequenceProducts& p, Normalisation normalisation) {
-  const bool affine = normalisation == Normalisation::affine;
-  CurvePlace nearest;
-  for (int i = 1; i + 2 < crossings; ++i) {
-    if (!is_usable(p, i) || !is_usable(p, i + 1)) continue;
-    const double share = std::clamp(best_share(p, i, affine), 0.0, 1.0);
-    const Interpolated interpolated = linear_at(share);
-    const Comparison here = compare(p, i, interpolated, affine);
-    if (here.distance_squared < nearest.distance_squared) nearest = make_place(p, i, share, interpolated, here);
-  }
-  return nearest;
-}
-
-CurvePlace nearest_place(const SequenceProducts& products, const CurvePlace& start, Normalisation normalisation,
-                         Interpolation interpolation) {
-  if (start.segment < 0 || !has_four(products, start.segment)) return start;
-  CurvePlace linear = start;
-  CurvePlace cubic = polish(products, start.segment, start.share, normalisation == Normalisation::affine);
-  linear.doubt = cubic.doubt = std::abs(cubic.segment + cubic.share - linear.segment - linear.share);
-  return interpolation == Interpolation::cubic ? cubic : linear;
-}
-
-double distance_squared(const SequenceProducts& products, const CurvePlace& place, Normalisation normalisation) {
-  const Interpolated there{place.value, place.derivative};
-  const double distance =
-      compare(products, place.segment, there, normalisation == Normalisation::affine).distance_squared;
-  return std::max(0.0, distance);
-}
-
 }  // namespace pagesweep
+#endif  // HWY_ONCE

@@ -1,50 +1,57 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
-#include <limits>
+#include <cstddef>
 
 #include "pagesweep/matching/match_epipolar.h"
+#include "pagesweep/matching/sequence_kernels_internal.h"
 
 namespace pagesweep {
 
-/// One pixel's sequence g and the sequences S_i where an epipolar curve crosses the other camera's pixel grid, by their
-/// inner products: all that a sum of squared differences between them depends on.
-struct SequenceProducts {
-  static constexpr int crossings = 6;
+/// Some pixels' sequences g and, for each, the sequences S_0 ... S_3 where an epipolar curve crosses the other camera's
+/// pixel grid, by their inner products: all that a sum of squared differences between them depends on. One entry a
+/// pixel.
+struct PlaceBatch {
+  static constexpr int most = 16;
+  static constexpr std::size_t crossings = CrossingProducts::crossings;
+  using Each = std::array<double, most>;
 
-  double gg = 0;                                   ///< g . g
-  Eigen::Matrix<double, crossings, 1> gs;          ///< g . S_i
-  Eigen::Matrix<double, crossings, crossings> ss;  ///< S_i . S_j
-  std::array<bool, crossings> usable{};            ///< whether the other camera has S_i
+  std::size_t count = most;  ///< pixels
+  double samples = 1;        ///< frames of a sequence
+  double freedom = 1;        ///< samples less the unknowns
+
+  alignas(64) Each gg{};                                                ///< g . g
+  alignas(64) std::array<Each, crossings> gs{};                         ///< g . S_i
+  alignas(64) std::array<std::array<Each, crossings>, crossings> ss{};  ///< S_i . S_j, where i <= j
+  /// Squared weights of the pixels that S_i was interpolated from: what is left of their noise.
+  alignas(64) std::array<Each, crossings> noise_share{};
+  alignas(64) std::array<Each, crossings> usable{};  ///< 1 where the other camera has S_i, else 0
+
+  alignas(64) Each share{};     ///< the place, from crossing 1 (0) to crossing 2 (1); NaN if one of them is missing
+  alignas(64) Each is_cubic{};  ///< 1 where four crossings were there for the cubic; else it is linear
+  alignas(64) Each distance_squared{};  ///< of the sequences, eq. 1
+  alignas(64) Each noise_variance{};    ///< of a sample of the other camera, if both share in the residual alike
+  alignas(64) Each gain{};              ///< by which the interpolated sequence is scaled
+  alignas(64) Each doubt{};  ///< [crossings] that the interpolation leaves: as much as linear and cubic differ
 };
 
-/// A place between two crossings.
-struct CurvePlace {
-  int segment = -1;     ///< it lies between crossings segment and segment + 1; -1: there is none
-  double share = 0;     ///< of the way from the one to the other
-  bool at_end = false;  ///< nothing is known beyond, where an even nearer place may be
-  double distance_squared = std::numeric_limits<double>::infinity();  ///< of the sequences, eq. 1
-  double gain = 1;                                                    ///< by which the interpolated sequence is scaled
-  double doubt = 0;  ///< [crossings] that the interpolation leaves: as much as linear and cubic differ
-  /// The interpolated sequence is the sum of value_k S_(segment - 1 + k); derivative_k gives its change a crossing.
-  Eigen::Vector4d value, derivative;
+/// Weights of the four crossings in an interpolated sequence, and their changes a crossing.
+struct CrossingWeights {
+  std::array<double, PlaceBatch::crossings> value, change;
 };
+CrossingWeights linear_weights(double share);
+CrossingWeights cubic_weights(double share);  ///< Catmull-Rom
 
-/// Where the interpolated sequence comes nearest to g (eq. 2), on the three segments in the middle.
+/// Where, between crossings 1 and 2, the interpolated sequences come nearest to g (eq. 2).
 ///
-/// Interpolated linearly, the sequences are a polyline in as many dimensions as there are frames, and the nearest point
-/// of each segment has a closed form: with normalisation none, the foot of g on the segment; with affine, where the
-/// gain is free too, g projected onto the plane of S_i and S_(i+1) (means are zero, so the offset is gone).
-CurvePlace nearest_on_polyline(const SequenceProducts& products, Normalisation normalisation);
-
-/// The same on the Catmull-Rom curve through the crossings, by Gauss-Newton steps from `start`, if that has the four
-/// crossings that it needs. Either way, `doubt` is how far the two places are apart.
-CurvePlace nearest_place(const SequenceProducts& products, const CurvePlace& start, Normalisation normalisation,
-                         Interpolation interpolation);
-
-/// The squared distance at a place by other products.
-double distance_squared(const SequenceProducts& products, const CurvePlace& place, Normalisation normalisation);
+/// Interpolated linearly, the sequences are a line in as many dimensions as there are frames, and the nearest point has
+/// a closed form: with normalisation none, the foot of g on the line; with affine, where the gain is free too, g
+/// projected onto the plane of S_1 and S_2 (means are zero, so the offset is gone). Noise is independent from crossing
+/// to crossing, so that a mixture of two has less of it, and a sum of squared differences that counts it is drawn
+/// towards the middle: its expected part is taken out of the products. With interpolation cubic, and the four crossings
+/// that it needs, Gauss-Newton steps go on from there along the Catmull-Rom curve through the crossings; `doubt` is how
+/// far they lead, either way.
+void find_nearest_places(PlaceBatch& batch, Normalisation normalisation, Interpolation interpolation);
 
 }  // namespace pagesweep

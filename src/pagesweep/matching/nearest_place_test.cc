@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <hwy/targets.h>
+#include <Eigen/Core>
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace pagesweep {
@@ -11,7 +14,7 @@ namespace {
 
 constexpr int frames = 12;
 using Sequence = Eigen::Matrix<double, frames, 1>;
-using Sequences = Eigen::Matrix<double, frames, SequenceProducts::crossings>;
+using Sequences = Eigen::Matrix<double, frames, 4>;
 
 /// Waves that travel with the place, without mean.
 Sequence pattern(double place) {
@@ -21,19 +24,14 @@ Sequence pattern(double place) {
   return s.array() - s.mean();
 }
 
-SequenceProducts products_of(const Sequence& g, const Sequences& s) {
-  SequenceProducts p;
-  p.gg = g.squaredNorm();
-  p.gs = s.transpose() * g;
-  p.ss = s.transpose() * s;
-  p.usable.fill(true);
-  return p;
-}
-
 Sequences crossings() {
   Sequences s;
-  for (int i = 0; i < SequenceProducts::crossings; ++i) s.col(i) = pattern(i);
+  for (int i = 0; i < 4; ++i) s.col(i) = pattern(i);
   return s;
+}
+
+Sequence combine(const Sequences& s, const std::array<double, 4>& weights) {
+  return s * Eigen::Map<const Eigen::Vector4d>(weights.data());
 }
 
 double distance_squared(const Sequence& g, const Sequence& s, bool affine) {
@@ -41,61 +39,133 @@ double distance_squared(const Sequence& g, const Sequence& s, bool affine) {
   return (g - gain * s).squaredNorm();
 }
 
+void load(const Sequence& g, const Sequences& s, double noise_share, std::size_t lane, PlaceBatch& batch) {
+  batch.gg[lane] = g.squaredNorm();
+  for (int i = 0; i < 4; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    batch.gs[k][lane] = g.dot(s.col(i));
+    batch.noise_share[k][lane] = noise_share;
+    batch.usable[k][lane] = 1;
+    for (int j = i; j < 4; ++j) batch.ss[k][static_cast<std::size_t>(j)][lane] = s.col(i).dot(s.col(j));
+  }
+}
+
+/// The least of a function of the share, sought in steps of a thousandth.
+template <class Function>
+double share_of_least(const Function& function) {
+  double best = 0;
+  for (int i = 0; i <= 1000; ++i)
+    if (function(1e-3 * i) < function(best)) best = 1e-3 * i;
+  return best;
+}
+
 class NearestPlace : public testing::TestWithParam<Normalisation> {
  protected:
+  static constexpr double sigma = 5;
   const bool affine = GetParam() == Normalisation::affine;
   const Sequences s = crossings();
+  PlaceBatch batch;
+
+  NearestPlace() {
+    batch.samples = frames;
+    batch.freedom = frames - 3;
+  }
+  ~NearestPlace() override { hwy::SetSupportedTargetsForTest(0); }
+
+  Sequence seen_from(double place) const { return (affine ? 1.3 : 1.0) * pattern(place); }
   Sequence noisy(double place, unsigned seed) const {
     std::mt19937 random(seed);
-    std::normal_distribution<double> noise(0, 5);
-    Sequence g = (affine ? 1.3 : 1.0) * pattern(place);
+    std::normal_distribution<double> noise(0, sigma);
+    Sequence g = seen_from(place);
     for (int i = 0; i < frames; ++i) g[i] += noise(random);
     return g.array() - g.mean();
   }
+  /// Of lane k, on all instruction sets.
+  template <class Body>
+  void on_every_target(Interpolation interpolation, const Body& body) {
+    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+      SCOPED_TRACE(hwy::TargetName(target));
+      hwy::SetSupportedTargetsForTest(target);
+      find_nearest_places(batch, GetParam(), interpolation);
+      for (std::size_t k = 0; k < batch.count; ++k) body(k);
+    }
+  }
 };
 
-TEST_P(NearestPlace, IsTheBestOfAllOnThePolyline) {
-  for (unsigned seed = 0; seed < 50; ++seed) {
-    const Sequence g = noisy(1.05 + 0.06 * seed, seed);
-    const CurvePlace place = nearest_on_polyline(products_of(g, s), GetParam());
-    double least = std::numeric_limits<double>::infinity();
-    for (int i = 1; i <= 3; ++i)
-      for (double share = 0; share <= 1; share += 1e-3)
-        least = std::min(least, distance_squared(g, (1 - share) * s.col(i) + share * s.col(i + 1), affine));
-    EXPECT_LE(place.distance_squared, least * (1 + 1e-9));
-    EXPECT_NEAR(place.distance_squared, least, 1e-2 * least);
-    EXPECT_NEAR(distance_squared(g, s.middleCols<4>(place.segment - 1) * place.value, affine), place.distance_squared,
-                1e-6 * place.distance_squared);
-  }
+TEST_P(NearestPlace, IsTheBestOfAllOnTheLine) {
+  std::array<Sequence, PlaceBatch::most> g;
+  for (unsigned k = 0; k < g.size(); ++k) load(g[k] = noisy(1 + k / 15.0, k), s, 0, k, batch);
+  on_every_target(Interpolation::linear, [&](std::size_t k) {
+    const auto at = [&](double share) {
+      return distance_squared(g[k], combine(s, linear_weights(share).value), affine);
+    };
+    const double best = share_of_least(at);
+    EXPECT_NEAR(batch.share[k], best, 1e-3);
+    EXPECT_LE(batch.distance_squared[k], at(best) * (1 + 1e-9));
+    EXPECT_NEAR(batch.distance_squared[k], at(batch.share[k]), 1e-6 * batch.gg[k]);
+    EXPECT_EQ(batch.is_cubic[k], 0);
+    EXPECT_NEAR(batch.noise_variance[k], batch.distance_squared[k] / batch.freedom, 1e-9 * batch.distance_squared[k]);
+  });
+}
+
+TEST_P(NearestPlace, IsTheBestOfAllOnTheSpline) {
+  std::array<Sequence, PlaceBatch::most> g;
+  for (unsigned k = 0; k < g.size(); ++k) load(g[k] = noisy(1 + k / 15.0, k), s, 0, k, batch);
+  on_every_target(Interpolation::cubic, [&](std::size_t k) {
+    const auto at = [&](double share) {
+      return distance_squared(g[k], combine(s, cubic_weights(share).value), affine);
+    };
+    const double best = share_of_least(at);
+    EXPECT_NEAR(batch.share[k], best, 1e-2);
+    EXPECT_LE(batch.distance_squared[k], at(best) + 1e-4 * batch.gg[k]);
+    EXPECT_NEAR(batch.distance_squared[k], at(batch.share[k]), 1e-6 * batch.gg[k]);
+    EXPECT_EQ(batch.is_cubic[k], 1);
+  });
 }
 
 TEST_P(NearestPlace, FindsThePlaceOfASmoothPattern) {
-  double linear_squares = 0, cubic_squares = 0;
-  for (unsigned i = 0; i < 60; ++i) {
-    const double truth = 1.02 + 0.05 * i;
-    const Sequence g = (affine ? 1.3 : 1.0) * pattern(truth);
-    const auto error = [&](Interpolation interpolation) {
-      const SequenceProducts p = products_of(g, s);
-      const CurvePlace place = nearest_place(p, nearest_on_polyline(p, GetParam()), GetParam(), interpolation);
-      return place.segment + place.share - truth;
-    };
-    linear_squares += std::pow(error(Interpolation::linear), 2);
-    cubic_squares += std::pow(error(Interpolation::cubic), 2);
-  }
-  EXPECT_LT(std::sqrt(cubic_squares / 60), 0.005);  // waves 12 and 20 crossings long
+  for (unsigned k = 0; k < PlaceBatch::most; ++k) load(seen_from(1 + k / 15.0), s, 0, k, batch);
+  double squares = 0;
+  const auto add_error = [&](std::size_t k) { squares += std::pow(1 + batch.share[k] - (1 + k / 15.0), 2); };
+  on_every_target(Interpolation::linear, add_error);
+  const double linear_squares = std::exchange(squares, 0);
+  on_every_target(Interpolation::cubic, add_error);
+  const auto targets = static_cast<double>(hwy::SupportedAndGeneratedTargets().size());
+  EXPECT_LT(std::sqrt(squares / targets / PlaceBatch::most), 0.005);  // waves 12 and 20 crossings long
   // A free gain makes up for most of what linear interpolation attenuates.
   if (!affine) {
-    EXPECT_LT(cubic_squares, 0.5 * linear_squares);
+    EXPECT_LT(squares, 0.5 * linear_squares);
   }
 }
 
-TEST_P(NearestPlace, PassesOverCrossingsThatAreMissing) {
-  SequenceProducts p = products_of(noisy(2.4, 1), s);
-  p.usable[2] = false;
-  const CurvePlace place = nearest_on_polyline(p, GetParam());
-  EXPECT_TRUE(place.segment == 3);
-  p.usable.fill(false);
-  EXPECT_EQ(nearest_on_polyline(p, GetParam()).segment, -1);
+TEST_P(NearestPlace, NoiseOfTheCrossingsDoesNotDrawItToTheMiddle) {
+  // Noise that the other camera's pixels share with nothing: the line between two of them has less of it.
+  double with = 0, without = 0;
+  constexpr int rounds = 60;
+  for (unsigned round = 0; round < rounds; ++round) {
+    std::mt19937 random(round);
+    std::normal_distribution<double> noise(0, sigma);
+    Sequences seen;
+    for (int i = 0; i < 4; ++i) {
+      for (int k = 0; k < frames; ++k) seen(k, i) = 0.1 * pattern(i)[k] + noise(random) / 3;
+      seen.col(i).array() -= seen.col(i).mean();
+    }
+    for (unsigned k = 0; k < PlaceBatch::most; ++k)
+      load(0.1 * seen_from(1 + 0.2 * (k / 15.0)), seen, round % 2, k, batch);
+    find_nearest_places(batch, GetParam(), Interpolation::linear);
+    for (unsigned k = 0; k < PlaceBatch::most; ++k) (round % 2 ? without : with) += batch.share[k] - 0.2 * (k / 15.0);
+  }
+  EXPECT_LT(std::abs(without), std::abs(with));
+}
+
+TEST_P(NearestPlace, KnowsNothingBesideAMissingCrossing) {
+  for (unsigned k = 0; k < PlaceBatch::most; ++k) load(noisy(1.4, k), s, 0, k, batch);
+  batch.usable[1][2] = batch.usable[2][3] = batch.usable[0][4] = batch.usable[3][5] = 0;
+  on_every_target(Interpolation::cubic, [&](std::size_t k) {
+    EXPECT_EQ(std::isnan(batch.share[k]), k == 2 || k == 3) << k;
+    EXPECT_EQ(batch.is_cubic[k] > 0, k < 2 || k > 5) << k;
+    EXPECT_EQ(batch.doubt[k] > 0, k < 2 || k > 5) << k;
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Normalisations, NearestPlace, testing::Values(Normalisation::none, Normalisation::affine),

@@ -23,13 +23,14 @@ struct Direction {
   const RayTable* from;
   const RayTable* to;
   const Matcher* matcher;
+  EpipolarGeometry everywhere{*from, *to, {0, 0}};
 
-  EpipolarGeometry geometry(InverseDepthRange range) const { return {*from, *to, range}; }
+  EpipolarGeometry geometry(InverseDepthRange range) const { return everywhere.within(range); }
 };
 
-Match find(const Direction& direction, const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y,
+Match find(const Matcher& matcher, const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y,
            double expected) {
-  const PixelStatus status = direction.matcher->status_of(x, y);
+  const PixelStatus status = matcher.status_of(x, y);
   if (status != PixelStatus::ok) return Match::none(status);
   const EpipolarCurve curve = geometry.curve(x, y);
   if (curve.range().empty()) return Match::none(PixelStatus::outside_view);
@@ -60,11 +61,11 @@ std::vector<double> probe_depths(const Direction& there, const Direction& back, 
     const auto finder = there.matcher->make_finder(), return_finder = back.matcher->make_finder();
     for (int x = stride / 2; x < width; x += stride) {
       const int y = std::min(row * stride + stride / 2, height - 1);
-      const Match match = find(there, geometry, *finder, x, y, nan);
+      const Match match = find(*there.matcher, geometry, *finder, x, y, nan);
       if (match.status != PixelStatus::ok) continue;
       const int u = std::clamp(static_cast<int>(std::lround(match.pixel.x())), 0, there.to->width() - 1);
       const int v = std::clamp(static_cast<int>(std::lround(match.pixel.y())), 0, there.to->height() - 1);
-      const Match returned = find(back, return_geometry, *return_finder, u, v, nan);
+      const Match returned = find(*back.matcher, return_geometry, *return_finder, u, v, nan);
       const bool agrees = returned.status == PixelStatus::ok && (returned.pixel - Eigen::Vector2d(x, y)).norm() < 3;
       if (agrees) rows[static_cast<std::size_t>(row)].push_back(match.inverse_depth);
     }
@@ -98,6 +99,25 @@ DepthRanges find_ranges(const Direction& there, const Direction& back, InverseDe
   return ranges;
 }
 
+constexpr int rows_at_once = 16;
+
+Correspondences match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress) {
+  constexpr int band = 8 * rows_at_once;  // rows between two reports of progress
+  const EpipolarGeometry geometry = direction.geometry(range);
+  Correspondences matches(direction.from->width(), direction.from->height());
+  progress.begin(fmt::format("matching {} with {}", direction.from->camera().name, direction.to->camera().name));
+  for (int top = 0; top < matches.height(); top += band) {
+    const int rows = std::min(band, matches.height() - top);
+    parallel_ranges(rows, rows_at_once, [&](int begin, int end) {
+      direction.matcher->match_rows(geometry, top + begin, top + end, matches);
+    });
+    progress.advance(static_cast<double>(top + rows) / matches.height());
+  }
+  return matches;
+}
+
+}  // namespace
+
 void put(const Match& match, int x, int y, Correspondences& matches) {
   matches.status(x, y) = match.status;
   if (match.status != PixelStatus::ok) return;
@@ -107,12 +127,8 @@ void put(const Match& match, int x, int y, Correspondences& matches) {
   matches.slope(x, y) = static_cast<float>(match.slope);
 }
 
-constexpr int rows_at_once = 16;
-
-/// Some rows side by side, from left to right.
-void match_rows(const Direction& direction, const EpipolarGeometry& geometry, int top, int bottom,
-                Correspondences& matches) {
-  const auto finder = direction.matcher->make_finder();
+void Matcher::match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const {
+  const auto finder = make_finder();
   const auto rows = static_cast<std::size_t>(bottom - top);
   std::array<double, rows_at_once> expected;
   std::array<Match, rows_at_once> column;
@@ -123,28 +139,12 @@ void match_rows(const Direction& direction, const EpipolarGeometry& geometry, in
     for (std::size_t row = 0; row < rows; ++row) {
       const int y = top + static_cast<int>(row);
       Match& match = column[row];
-      if (match.status == PixelStatus::not_computed) match = find(direction, geometry, *finder, x, y, expected[row]);
+      if (match.status == PixelStatus::not_computed) match = find(*this, geometry, *finder, x, y, expected[row]);
       put(match, x, y, matches);
       if (match.status == PixelStatus::ok) expected[row] = match.inverse_depth;
     }
   }
 }
-
-Correspondences match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress) {
-  constexpr int band = 8 * rows_at_once;  // rows between two reports of progress
-  const EpipolarGeometry geometry = direction.geometry(range);
-  Correspondences matches(direction.from->width(), direction.from->height());
-  progress.begin(fmt::format("matching {} with {}", direction.from->camera().name, direction.to->camera().name));
-  for (int top = 0; top < matches.height(); top += band) {
-    const int rows = std::min(band, matches.height() - top);
-    parallel_ranges(rows, rows_at_once,
-                    [&](int begin, int end) { match_rows(direction, geometry, top + begin, top + end, matches); });
-    progress.advance(static_cast<double>(top + rows) / matches.height());
-  }
-  return matches;
-}
-
-}  // namespace
 
 MatchPair match_both_ways(const RayTable& first, const RayTable& second, const Matcher& from_first,
                           const Matcher& from_second, const MatchOptions& options, Progress& progress) {

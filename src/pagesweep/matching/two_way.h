@@ -45,7 +45,12 @@ class Matcher {
   /// Why the pixel cannot be matched at all; ok if it can.
   virtual PixelStatus status_of(int x, int y) const = 0;
   virtual std::unique_ptr<MatchFinder> make_finder() const = 0;
+  /// Matches the rows top ... bottom - 1: some side by side, each from left to right.
+  virtual void match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const;
 };
+
+/// Enters one pixel's match, or why it has none.
+void put(const Match& match, int x, int y, Correspondences& matches);
 
 /// Matches all pixels both ways, finding the depth ranges first where they are not given, and keeps what agrees.
 MatchPair match_both_ways(const RayTable& first, const RayTable& second, const Matcher& from_first,
