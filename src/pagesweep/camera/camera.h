@@ -25,6 +25,14 @@ struct BrownConrady {
   bool is_valid_at(double radius_squared) const;
 };
 
+/// What turns light into gray values, as measured after EMVA 1288 (Standard for Characterization of Image Sensors and
+/// Cameras, release 4.0). At g gray values above black, noise has the variance gain g + read_noise^2.
+struct CameraSensor {
+  double gain = 1;          ///< system gain [gray values an electron], from photon transfer
+  double read_noise = 0;    ///< temporal noise in the dark [gray values], one standard deviation
+  double psf_sigma_px = 0;  ///< standard deviation of the point spread function, lens and pixel together [px]
+};
+
 /// A frame camera. Pixel (u, v) = (column, row), (0, 0) at the CENTRE of the top-left pixel.
 struct Camera {
   std::string name;
@@ -33,6 +41,7 @@ struct Camera {
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< [px]
   BrownConrady distortion;
   Rigid3 cam_from_rig;
+  std::optional<CameraSensor> sensor = {};  ///< nothing: not known
 
   /// Where a rig point is imaged [px], be it inside the picture or not; nothing if the point is behind the camera or
   /// beyond the distortion's valid radius.

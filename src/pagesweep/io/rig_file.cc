@@ -61,6 +61,11 @@ Camera read_brown_conrady(const JsonReader& json) {
   return camera;
 }
 
+CameraSensor read_sensor(const JsonReader& json) {
+  return {positive(json.at("gain")), json.at("read_noise").number(0, longest),
+          json.at("psf_sigma_px").number(0, longest)};
+}
+
 Camera read_camera(const JsonReader& json) {
   const JsonReader model = json.at("model");
   if (model.text() != "brown-conrady")
@@ -71,6 +76,7 @@ Camera read_camera(const JsonReader& json) {
   if (camera.name.empty() || camera.name.find('/') != std::string::npos ||
       camera.name.find('\0') != std::string::npos || camera.name.front() == '.')
     throw name.error("expected a name that can begin a file's name: not empty, no slash, no leading dot");
+  if (const auto sensor = json.find("sensor")) camera.sensor = read_sensor(*sensor);
   return camera;
 }
 
@@ -173,6 +179,10 @@ ordered_json to_json(const Camera& camera) {
           {"translation", to_json(camera.cam_from_rig.translation)}};
 }
 
+ordered_json to_json(const CameraSensor& sensor) {
+  return {{"gain", sensor.gain}, {"read_noise", sensor.read_noise}, {"psf_sigma_px", sensor.psf_sigma_px}};
+}
+
 template <class Line>
 ordered_json line_to_json(std::string_view model, const Line& line) {
   return {{"model", model},
@@ -248,6 +258,7 @@ void write_rig(const std::filesystem::path& file, const Rig& rig) {
   for (const Camera& camera : rig.cameras) {
     ordered_json item = {{"name", camera.name}};
     item.update(to_json(camera));
+    if (camera.sensor) item["sensor"] = to_json(*camera.sensor);
     json["cameras"].push_back(item);
   }
   const auto convert = [](const auto& model) { return to_json(model); };

@@ -80,6 +80,20 @@ TEST(RigFile, KeepsEveryLightModelToTheLastBit) {
   }
 }
 
+TEST(RigFile, KeepsTheSensorOfACameraThatHasOne) {
+  const TestFolder folder;
+  Rig rig;
+  rig.cameras = {some_camera("cam1"), some_camera("cam2")};
+  rig.cameras[1].sensor = CameraSensor{.gain = 0.025, .read_noise = 1.2, .psf_sigma_px = 0.7};
+  write_rig(folder / "rig.json", rig);
+  const Rig back = read_rig(folder / "rig.json");
+  EXPECT_FALSE(back.cameras[0].sensor);
+  ASSERT_TRUE(back.cameras[1].sensor);
+  EXPECT_EQ(back.cameras[1].sensor->gain, 0.025);
+  EXPECT_EQ(back.cameras[1].sensor->read_noise, 1.2);
+  EXPECT_EQ(back.cameras[1].sensor->psf_sigma_px, 0.7);
+}
+
 TEST(RigFile, WritesNoNumberThatIsNotFinite) {
   const TestFolder folder;
   Rig rig;
@@ -94,7 +108,8 @@ constexpr const char* sound_rig = R"({
   "format": "pagesweep-rig", "version": 1,
   "cameras": [
     {"name": "cam1", "model": "brown-conrady", "width": 1024, "height": 1024, "fx": 1700, "fy": 1700, "cx": 511.5,
-     "cy": 511.5, "k1": 0.0, "rotation": [1,0,0, 0,-1,0, 0,0,-1], "translation": [0, 0, 700]},
+     "cy": 511.5, "k1": 0.0, "rotation": [1,0,0, 0,-1,0, 0,0,-1], "translation": [0, 0, 700],
+     "sensor": {"gain": 0.025, "read_noise": 1.2, "psf_sigma_px": 0.7}},
     {"name": "cam2", "model": "brown-conrady", "width": 1024, "height": 1024, "fx": 1701, "fy": 1702, "cx": 510.5,
      "cy": 509.5, "rotation": [1,0,0, 0,1,0, 0,0,1], "translation": [0, 100, 701]}],
   "scanner": {"model": "pushbroom", "width": 4961, "height": 3508, "f": 8268, "cx": 2480, "k1": 0,
@@ -155,6 +170,11 @@ TEST(RigFile, NamesFileFieldAndWhatWasExpected) {
       {"[1,0,0, 0,1,0, 0,0,1]", "[1,0,0, 0,\"1\",0, 0,0,1]", "cameras[1].rotation[4]", "expected a number"},
       {"\"translation\": [0, 100, 701]", "\"translation\": [0, 100]", "cameras[1].translation", "3 numbers, found 2"},
       {"\"translation\": [0, 100, 701]", "\"translation\": [0, 1e12, 7]", "cameras[1].translation", "millimetres"},
+      {"\"gain\": 0.025", "\"gain\": 0", "cameras[0].sensor.gain", "above 0"},
+      {"\"gain\": 0.025,", "", "cameras[0].sensor.gain", "is missing"},
+      {"\"read_noise\": 1.2", "\"read_noise\": -1", "cameras[0].sensor.read_noise", "from 0"},
+      {"\"psf_sigma_px\": 0.7", "\"psf_sigma_px\": \"sharp\"", "cameras[0].sensor.psf_sigma_px", "expected a number"},
+      {"{\"gain\": 0.025, \"read_noise\": 1.2, \"psf_sigma_px\": 0.7}", "7", "cameras[0].sensor", "expected an object"},
       {"\"pushbroom\"", "\"drone\"", "scanner.model", "\"rotating-line\", found \"drone\""},
       {"\"f\": 8268", "\"f\": 0", "scanner.f", "above 0"},
       {"\"step\": [0, -0.0847, 0]", "\"step\": [0, 0, 0]", "scanner.step", "expected a step across the sensor line"},
