@@ -10,8 +10,11 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/io/capture_file.h"
+#include "pagesweep/io/colmap_rig.h"
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
+#include "pagesweep/io/kalibr_rig.h"
+#include "pagesweep/io/opencv_rig.h"
 #include "pagesweep/io/ply_file.h"
 #include "pagesweep/io/recording_file.h"
 #include "pagesweep/io/rig_file.h"
@@ -33,6 +36,12 @@ void read(const std::filesystem::path& file) {
 #elif defined(PAGESWEEP_FUZZ_recording)
   const pagesweep::RecordingReader reader(file);
   for (int page = 0; page < reader.pages(); ++page) reader.read(page);
+#elif defined(PAGESWEEP_FUZZ_opencv_rig)
+  pagesweep::read_opencv_rig({&file, 1}, {.width = 640, .height = 480});
+#elif defined(PAGESWEEP_FUZZ_kalibr_rig)
+  pagesweep::read_kalibr_rig(file);
+#elif defined(PAGESWEEP_FUZZ_colmap_rig)
+  pagesweep::read_colmap_rig(file, "/dev/null");
 #else  // png, tiff: told apart by their first bytes
   pagesweep::read_gray(file);
 #endif

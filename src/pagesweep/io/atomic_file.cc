@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include <atomic>
+#include <deque>
 #include <span>
 
 #include "pagesweep/base/error.h"
@@ -27,6 +28,13 @@ std::filesystem::path make_temporary(const std::filesystem::path& target) {
     }
     if (errno != EEXIST) throw cannot_write(target, message_of(errno));
   }
+}
+
+void fill(const AtomicFile& output, std::string_view bytes) {
+  FileDescriptor descriptor(output.temporary(), O_WRONLY);  // not O_TRUNC, after which ext4 waits for the disk
+  if (descriptor.number() < 0) throw cannot_write(output.target(), message_of(errno));
+  if (!descriptor.write(std::as_bytes(std::span(bytes)))) throw cannot_write(output.target(), message_of(errno));
+  if (!descriptor.close()) throw cannot_write(output.target(), message_of(errno));
 }
 
 }  // namespace
@@ -56,11 +64,14 @@ void AtomicFile::commit() {
 
 void write_bytes(const std::filesystem::path& file, std::string_view bytes) {
   AtomicFile output(file);
-  FileDescriptor descriptor(output.temporary(), O_WRONLY);  // not O_TRUNC, after which ext4 waits for the disk
-  if (descriptor.number() < 0) throw cannot_write(file, message_of(errno));
-  if (!descriptor.write(std::as_bytes(std::span(bytes)))) throw cannot_write(file, message_of(errno));
-  if (!descriptor.close()) throw cannot_write(file, message_of(errno));
+  fill(output, bytes);
   output.commit();
+}
+
+void write_together(const std::filesystem::path& folder, std::span<const NamedText> files) {
+  std::deque<AtomicFile> outputs;
+  for (const NamedText& file : files) fill(outputs.emplace_back(folder / file.name), file.text);
+  for (AtomicFile& output : outputs) output.commit();
 }
 
 std::string read_bytes(const std::filesystem::path& file, std::size_t most_bytes) {

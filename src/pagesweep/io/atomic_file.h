@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -31,6 +32,15 @@ class AtomicFile {
 /// Writes a whole file.
 /// \throws Error  if it cannot be written
 void write_bytes(const std::filesystem::path& file, std::string_view bytes);
+
+struct NamedText {
+  std::string name;  ///< of the file in its folder
+  std::string text;
+};
+
+/// Writes files of one folder that belong together. Each is whole before the first takes its name.
+/// \throws Error  if one cannot be written
+void write_together(const std::filesystem::path& folder, std::span<const NamedText> files);
 
 /// Reads a whole file.
 /// \throws Error  if it cannot be read, or holds more than `most_bytes`

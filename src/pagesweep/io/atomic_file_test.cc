@@ -130,6 +130,17 @@ TEST(AtomicFile, EveryWriterSaysThatTheDiskIsFullAndLeavesNothing) {
   }
 }
 
+TEST(AtomicFile, FilesWrittenTogetherAppearTogether) {
+  const TestFolder folder;
+  const NamedText files[] = {{"a.txt", "one"}, {"b.txt", "two"}};
+  std::filesystem::create_directory(folder / "b.txt");
+  EXPECT_THAT(error_of([&] { write_together(folder.path(), files); }), HasSubstr("b.txt: cannot be written"));
+  EXPECT_EQ(folder.files(), 0u);
+  std::filesystem::remove(folder / "b.txt");
+  write_together(folder / "new", files);
+  EXPECT_EQ(read_text(folder / "new/a.txt") + read_text(folder / "new/b.txt"), "onetwo");
+}
+
 TEST(ReadBytes, RefusesWhatIsTooLarge) {
   const TestFolder folder;
   write_bytes(folder / "a.txt", "12345");

@@ -116,6 +116,16 @@ std::vector<JsonReader> JsonReader::items() const {
   return items;
 }
 
+std::vector<std::string> JsonReader::names() const {
+  const json& value = value_at(value_);
+  if (!value.is_object()) throw unexpected("an object");
+  std::vector<std::string> names;
+  for (const auto& [name, field] : value.items()) names.push_back(name);
+  return names;
+}
+
+bool JsonReader::is_object() const { return value_at(value_).is_object(); }
+
 bool JsonReader::is_array() const { return value_at(value_).is_array(); }
 
 std::string JsonReader::text() const {
@@ -174,17 +184,20 @@ Eigen::Matrix3d JsonReader::rotation() const {
   const auto numbers = this->numbers();
   if (numbers.size() != 9)
     throw error(fmt::format("expected the 9 numbers of a row-major 3x3 matrix, found {}", numbers.size()));
-  Eigen::Matrix3d matrix = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(numbers.data());
+  return exact_rotation(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(numbers.data()), *this);
+}
+
+Eigen::Matrix3d exact_rotation(Eigen::Matrix3d matrix, const JsonReader& where) {
   const auto deviation = [&] {
     return (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   };
   if (!(deviation() <= rotation_tolerance))
-    throw error(
+    throw where.error(
         fmt::format("expected a rotation matrix, found one with |R^T R - I| = {:.3g} (at most {:g} is "
                     "rounding): its rows must have length 1 and be perpendicular",
                     deviation(), rotation_tolerance));
   if (matrix.determinant() < 0)
-    throw error("expected a rotation matrix, found a reflection (determinant -1): all axes must be right-handed");
+    throw where.error("expected a rotation matrix, found a reflection (determinant -1): all axes must be right-handed");
   // Newton's iteration to the nearest orthogonal matrix: doubles the correct digits each time.
   for (int i = 0; i < 3 && deviation() > rounding; ++i)
     matrix = (1.5 * matrix - 0.5 * matrix * matrix.transpose() * matrix).eval();

@@ -33,7 +33,9 @@ class JsonReader {
   JsonReader at(std::string_view name) const;                   ///< the field of that name
   std::optional<JsonReader> find(std::string_view name) const;  ///< likewise; nothing if it is absent or null
   std::vector<JsonReader> items() const;                        ///< of an array
-  bool is_array() const;                                        ///< where a field may be one or several
+  std::vector<std::string> names() const;                       ///< of an object's fields, in alphabetical order
+  bool is_object() const;
+  bool is_array() const;  ///< where a field may be one or several
   std::string text() const;
   bool boolean() const;
   int integer(int lowest, int highest) const;
@@ -42,7 +44,7 @@ class JsonReader {
   std::vector<double> numbers() const;                 ///< an array of finite numbers
   Eigen::Vector3d vector() const;                      ///< an array of three
   Eigen::Vector3d unit_vector() const;                 ///< likewise, of length 1 within 1e-4; it is made exact
-  Eigen::Matrix3d rotation() const;  ///< row-major, orthogonal within 1e-6 and right-handed; it is made exact
+  Eigen::Matrix3d rotation() const;                    ///< row-major, see exact_rotation()
 
   /// An error about this value, for checks of the caller's own.
   Error error(const std::string& problem) const;
@@ -57,5 +59,10 @@ class JsonReader {
   const void* value_;  ///< nlohmann::json in document_, which stays out of this header
   std::string place_;
 };
+
+/// The nearest rotation matrix, if that is what a matrix is meant to be: orthogonal within 1e-4 and right-handed. One
+/// that is exact to double precision is kept to the last bit.
+/// \throws Error  about `where` it stands, otherwise
+Eigen::Matrix3d exact_rotation(Eigen::Matrix3d matrix, const JsonReader& where);
 
 }  // namespace pagesweep

@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <functional>
+#include <iterator>
 #include <random>
 
 #include "pagesweep/io/capture_file.h"
+#include "pagesweep/io/colmap_rig.h"
 #include "pagesweep/io/files_testing.h"
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
+#include "pagesweep/io/kalibr_rig.h"
+#include "pagesweep/io/opencv_rig.h"
 #include "pagesweep/io/ply_file.h"
 #include "pagesweep/io/recording_file.h"
 #include "pagesweep/io/rig_file.h"
+#include "pagesweep/io/rig_testing.h"
 #include "pagesweep/io/truth_file.h"
 
 namespace pagesweep {
@@ -68,6 +74,7 @@ Picture some_picture(int bit_depth) {
 Rig some_rig() {
   Rig rig;
   rig.cameras = {{"cam1", 32, 24, 40, 40, 15.5, 11.5, {0.1, 0, 0, 0, 0}, {}}};
+  rig.cameras[0].sensor = CameraSensor{0.025, 1.2, 0.7};
   rig.scanner = Scanner(Pushbroom{100, 200, 300, 50, 0, {Eigen::Matrix3d::Identity()}, {0, 0, 700}, {0, 0.1, 0}});
   rig.light = Light(TranslatingPlane{{0, 1, 0}, -150, 1.5});
   return rig;
@@ -87,6 +94,7 @@ void write_truth_to(const std::filesystem::path& file) {
   truth.folder = file.parent_path();
   truth.pages = {{1, 11.8, 8, "page_1.txt"}};
   truth.stripe = {1.5, 12};
+  truth.sensor = {40, 1.2};
   truth.profile = {-1, 0.5, {0, 1, 0}};
   write_truth(truth);
 }
@@ -109,6 +117,26 @@ void read_recording(const std::filesystem::path& file) {
   for (int page = 0; page < reader.pages(); ++page) reader.read(page);
 }
 
+/// Rigs of other programs. Where two files make one, one of them is damaged.
+std::vector<Format> foreign_rigs() {
+  using Path = std::filesystem::path;
+  const auto write_stereo = [](const Path& file) { write_opencv_stereo(file.parent_path(), test::two_cameras()); };
+  const auto write_model = [](const Path& file) { write_colmap_rig(file.parent_path(), test::two_cameras()); };
+  const auto read_opencv = [](const std::vector<Path>& files) { read_opencv_rig(files); };
+  return {
+      {"opencv.yml", [](const Path& file) { write_opencv_rig(file, test::two_cameras()); },
+       [=](const Path& file) { read_opencv({file}); }},
+      {"intrinsics.yml", write_stereo,
+       [=](const Path& file) { read_opencv({file.parent_path() / "extrinsics.yml", file}); }},
+      {"extrinsics.yml", write_stereo,
+       [=](const Path& file) { read_opencv({file.parent_path() / "intrinsics.yml", file}); }},
+      {"cameras.txt", write_model, [](const Path& file) { read_colmap_rig(file, file.parent_path() / "images.txt"); }},
+      {"images.txt", write_model, [](const Path& file) { read_colmap_rig(file.parent_path() / "cameras.txt", file); }},
+      {"camchain.yaml", [](const Path& file) { write_kalibr_rig(file, test::two_cameras()); },
+       [](const Path& file) { read_kalibr_rig(file); }},
+  };
+}
+
 std::vector<Format> all_formats() {
   using Path = std::filesystem::path;
   const auto write_page = [](const Path& file) { write_picture(file, some_picture(8)); };
@@ -124,7 +152,7 @@ std::vector<Format> all_formats() {
     const Image<float> channel(30, 20, 1.5F);
     write_float_tiff(file, {channel.view(), channel.view()});
   };
-  return {
+  std::vector<Format> formats = {
       {"rig.json", [](const Path& file) { write_rig(file, some_rig()); }, [](const Path& file) { read_rig(file); }},
       {"capture.json", write_capture_to, [](const Path& file) { read_capture(file); }},
       {"truth.json", write_truth_to, [](const Path& file) { read_truth(file); }},
@@ -140,6 +168,8 @@ std::vector<Format> all_formats() {
       {"page.jpg", write_page, read_page},
       {"page.jp2", write_page, read_page},
   };
+  std::ranges::move(foreign_rigs(), std::back_inserter(formats));
+  return formats;
 }
 
 class MutatedInput : public testing::TestWithParam<int> {};

@@ -17,6 +17,7 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/io/atomic_file.h"
+#include "pagesweep/io/words_internal.h"
 
 namespace pagesweep {
 namespace {
@@ -65,18 +66,6 @@ struct Header {
   std::vector<Element> elements;
   std::size_t bytes = 0;
 };
-
-std::vector<std::string_view> words_of(std::string_view line) {
-  std::vector<std::string_view> words;
-  while (true) {
-    const auto begin = line.find_first_not_of(" \t\r");
-    if (begin == std::string_view::npos) return words;
-    line.remove_prefix(begin);
-    const auto end = std::min(line.find_first_of(" \t\r"), line.size());
-    words.push_back(line.substr(0, end));
-    line.remove_prefix(end);
-  }
-}
 
 /// Reads a PLY's header line by line.
 class HeaderReader {
@@ -178,12 +167,9 @@ class BodyReader {
     body_.remove_prefix(begin);
     const auto word = body_.substr(0, std::min(body_.find_first_of(" \t\r\n"), body_.size()));
     body_.remove_prefix(word.size());
-    const bool has_plus = word.starts_with('+');
-    double number = 0;
-    const auto [end, failed] = std::from_chars(word.data() + has_plus, word.data() + word.size(), number);
-    if (failed != std::errc() || end != word.data() + word.size())
-      throw bad_input(file_, "", fmt::format("expected a number, found \"{}\"", word.substr(0, 40)));
-    return number;
+    const auto number = number_in(word);
+    if (!number) throw bad_input(file_, "", fmt::format("expected a number, found \"{}\"", word.substr(0, 40)));
+    return *number;
   }
 
   double binary_value(PlyType type) {

@@ -9,25 +9,16 @@
 
 #include "pagesweep/io/json_file.h"
 #include "pagesweep/io/json_reader.h"
+#include "pagesweep/io/rig_fields_internal.h"
 
 namespace pagesweep {
 namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int widest_px = 200'000;  ///< no camera or scanner has more; keeps width x height in an int's reach
-constexpr double longest = 1e9;     ///< [mm, px] what is beyond is a mistake and would overflow somewhere
-
 double number_or_zero(const JsonReader& json, std::string_view name) {
   const auto field = json.find(name);
   return field ? field->number(-longest, longest) : 0;
-}
-
-/// Where a range may not include its end.
-double positive(const JsonReader& json) {
-  const double value = json.number();
-  if (!(value > 0 && value <= longest)) throw json.error(fmt::format("expected a number above 0, found {}", value));
-  return value;
 }
 
 double not_zero(const JsonReader& json) {
@@ -73,8 +64,7 @@ Camera read_camera(const JsonReader& json) {
   Camera camera = read_brown_conrady(json);
   const JsonReader name = json.at("name");
   camera.name = name.text();
-  if (camera.name.empty() || camera.name.find('/') != std::string::npos ||
-      camera.name.find('\0') != std::string::npos || camera.name.front() == '.')
+  if (!is_camera_name(camera.name))
     throw name.error("expected a name that can begin a file's name: not empty, no slash, no leading dot");
   if (const auto sensor = json.find("sensor")) camera.sensor = read_sensor(*sensor);
   return camera;
