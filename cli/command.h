@@ -34,6 +34,7 @@ void add_plan_command(CLI::App& app);
 void add_acceptance_command(CLI::App& app);
 void add_convert_command(CLI::App& app);
 void add_check_command(CLI::App& app);
+void add_rig_command(CLI::App& app);
 void add_info_command(CLI::App& app);
 
 }  // namespace pagesweep::cli

@@ -44,7 +44,7 @@ std::string model_name(const Light& light) {
 }
 
 Description describe_camera(const Camera& camera) {
-  const Eigen::Vector3d center = camera.center();
+  const Eigen::Vector3d center = camera.center().array() + 0.0;  // which makes -0 a 0
   Description description;
   description.lines.push_back(
       fmt::format("camera {}: {} x {} px, focal length {:.1f} px, at ({:.1f}, {:.1f}, {:.1f}) mm", camera.name,
@@ -54,6 +54,14 @@ Description describe_camera(const Camera& camera) {
                       {"height", camera.height},
                       {"focal_length_px", camera.fx},
                       {"center_mm", {center.x(), center.y(), center.z()}}};
+  if (const auto& sensor = camera.sensor) {
+    description.lines.push_back(fmt::format(
+        "  sensor: {:.3g} gray values an electron, {:.2f} gray values of noise in the dark, points spread by "
+        "{:.2f} px",
+        sensor->gain, sensor->read_noise, sensor->psf_sigma_px));
+    description.json["sensor"] = {
+        {"gain", sensor->gain}, {"read_noise", sensor->read_noise}, {"psf_sigma_px", sensor->psf_sigma_px}};
+  }
   return description;
 }
 
@@ -105,7 +113,7 @@ Description describe_rig(const Rig& rig) {
   description.json = {{"kind", "rig"}, {"cameras", nlohmann::ordered_json::array()}};
   for (const Camera& camera : rig.cameras) {
     const Description part = describe_camera(camera);
-    description.lines.push_back("  " + part.lines.front());
+    for (const std::string& line : part.lines) description.lines.push_back("  " + line);
     description.json["cameras"].push_back(part.json);
   }
   if (rig.cameras.size() == 2) {

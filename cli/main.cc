@@ -45,6 +45,7 @@ void add_commands(CLI::App& app) {
   add_acceptance_command(app);
   add_convert_command(app);
   add_check_command(app);
+  add_rig_command(app);
   add_info_command(app);
 }
 
