@@ -53,6 +53,7 @@ Description export_to(const Arguments& arguments) {
   const RigFormat format = export_rig(arguments.output, rig, arguments.options);
   Description answer;
   std::vector<std::string> names;
+  names.reserve(rig.cameras.size());
   for (const Camera& camera : rig.cameras) names.push_back(camera.name);
   answer.lines.push_back(
       fmt::format("{}: {} in the format {}", arguments.output.string(), fmt::join(names, ", "), name_of(format)));

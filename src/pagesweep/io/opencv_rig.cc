@@ -48,7 +48,7 @@ JsonReader need(const Documents& documents, const std::string& name, std::string
 Eigen::MatrixXd matrix_in(const JsonReader& json) {
   const int rows = json.at("rows").integer(1, most_coefficients), cols = json.at("cols").integer(1, most_coefficients);
   const auto data = json.at("data").numbers();
-  if (data.size() != static_cast<std::size_t>(rows * cols))
+  if (std::ssize(data) != rows * cols)
     throw json.at("data").error(
         fmt::format("expected {} numbers for {} x {}, found {}", rows * cols, rows, cols, data.size()));
   return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(data.data(), rows,
@@ -127,20 +127,29 @@ Camera read_single(const JsonReader& json, std::string name, const OpenCvHints& 
 
 bool is_single(const JsonReader& json) { return json.is_object() && json.find("camera_matrix"); }
 
-/// Our own file of several cameras, in the order of its field `cameras`.
-std::vector<Camera> read_blocks(const JsonReader& document, const OpenCvHints& hints) {
-  std::vector<Camera> cameras;
-  std::vector<std::string> names = document.names();
-  if (const auto order = document.find("cameras")) {
-    names.clear();
+/// The names of a file's blocks, in the order of its list `cameras`.
+std::vector<std::string> names_of_blocks(const JsonReader& document) {
+  std::vector<std::string> names;
+  if (const auto order = document.find("cameras"); order && order->is_array()) {
     for (const JsonReader& item : order->items()) names.push_back(item.text());
     if (std::set(names.begin(), names.end()).size() != names.size()) throw order->error("expected different names");
+    return names;
   }
+  for (const std::string& name : document.names())
+    if (const auto field = document.find(name); field && is_single(*field)) names.push_back(name);
+  return names;
+}
+
+/// Our own file of several cameras, each of which has to say where it is.
+std::vector<Camera> read_blocks(const JsonReader& document, const OpenCvHints& hints) {
+  const auto names = names_of_blocks(document);
+  std::vector<Camera> cameras;
+  cameras.reserve(names.size());
   for (const std::string& name : names) {
-    const auto block = document.find(name);
-    if (!block || !is_single(*block)) continue;
-    if (!is_camera_name(name)) throw block->error("expected a camera's name: not empty, no slash, no leading dot");
-    cameras.push_back(read_single(*block, name, hints));
+    const JsonReader block = document.at(name);
+    if (!is_camera_name(name)) throw block.error("expected a camera's name: not empty, no slash, no leading dot");
+    if (names.size() > 1) block.at("rotation");
+    cameras.push_back(read_single(block, name, hints));
   }
   return cameras;
 }
@@ -181,6 +190,7 @@ Error not_understood(const Documents& documents) {
 
 std::string matrix_text(const std::string& margin, std::string_view name, const Eigen::MatrixXd& matrix) {
   std::vector<std::string> numbers;
+  numbers.reserve(static_cast<std::size_t>(matrix.size()));
   for (Eigen::Index i = 0; i < matrix.size(); ++i)
     numbers.push_back(real_text(matrix(i / matrix.cols(), i % matrix.cols())));
   return fmt::format("{0}{1}: !!opencv-matrix\n{0}   rows: {2}\n{0}   cols: {3}\n{0}   dt: d\n{0}   data: [ {4} ]\n",
@@ -207,11 +217,11 @@ std::string single_text(const std::string& margin, const Camera& camera, double 
          pose_text(margin, camera.cam_from_rig, mm_per_unit);
 }
 
-/// cv::FileStorage knows no quotes around names.
+/// cv::FileStorage knows no quotes around names; `cameras` is the list of them.
 bool is_field_name(std::string_view name) {
   const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
   const auto is_inner = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '-'; };
-  return !name.empty() && is_letter(name.front()) && std::ranges::all_of(name, is_inner);
+  return !name.empty() && is_letter(name.front()) && name != "cameras" && std::ranges::all_of(name, is_inner);
 }
 
 }  // namespace

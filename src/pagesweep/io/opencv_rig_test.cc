@@ -224,6 +224,20 @@ TEST(OpenCvRig, NamesWhatIsWrongBetweenTwoCameras) {
               HasSubstr("640 x 480 as was given, found 2048 x 1500"));
 }
 
+TEST(OpenCvRig, WantsToKnowWhereEachOfSeveralCamerasIs) {
+  const TestFolder folder;
+  write_opencv_rig(folder / "rig.yml", test::two_cameras());
+  const std::string sound = test::read_text(folder / "rig.yml");
+  const auto message = [&](const std::string& from, const std::string& to) {
+    return error_of([&] { read_opencv_rig(put(folder, {replaced(sound, from, to)})); });
+  };
+  EXPECT_EQ(message("cameras: [ cam1, cam2 ]\n", ""), "");
+  EXPECT_THAT(message("   rotation:", "   turned:"), HasSubstr("0.yml: cam1.rotation: is missing"));
+  EXPECT_THAT(message("   translation:", "   shifted:"), HasSubstr("0.yml: cam1.translation: is missing"));
+  EXPECT_THAT(message("[ cam1, cam2 ]", "[ cam1, cam3 ]"), HasSubstr("0.yml: cam3: is missing"));
+  EXPECT_THAT(message("[ cam1, cam2 ]", "[ cam1, cam1 ]"), HasSubstr("0.yml: cameras: expected different names"));
+}
+
 TEST(OpenCvRig, WritesNothingThatItCannotHold) {
   const TestFolder folder;
   Rig rig = test::two_cameras();
