@@ -81,9 +81,10 @@ SensorPictures search(const PictureList& list, const std::vector<std::string>& n
   sensor.width = sizes.front().width, sensor.height = sizes.front().height;
   for (std::size_t i = 0; i < sizes.size(); ++i)
     if (sizes[i].width != sensor.width || sizes[i].height != sensor.height)
-      throw bad_input(list.files[i], "",
-                      fmt::format("has {} x {} px, but {} has {} x {}: all pictures of {} must be of one size", sizes[i].width,
-                                  sizes[i].height, list.files.front().string(), sensor.width, sensor.height, list.sensor));
+      throw bad_input(
+          list.files[i], "",
+          fmt::format("has {} x {} px, but {} has {} x {}: all pictures of {} must be of one size", sizes[i].width,
+                      sizes[i].height, list.files.front().string(), sensor.width, sensor.height, list.sensor));
   return sensor;
 }
 

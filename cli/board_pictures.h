@@ -22,8 +22,8 @@ struct PictureList {
 /// \throws Error                  if no file matches
 PictureList list_pictures(const std::string& text, const std::string& sensor);
 
-/// Searches all pictures for the board. Pictures of different sensors show the same pose if they have the same name up to
-/// its last dot; where no two names are the same but there are as many of each, the first belongs to the first.
+/// Searches all pictures for the board. Pictures of different sensors show the same pose if they have the same name up
+/// to its last dot; where no two names are the same but there are as many of each, the first belongs to the first.
 /// \throws Error  if a file cannot be read or differs in size from the sensor's others
 CalibrationInput find_boards(const Board& board, const std::vector<PictureList>& cameras, const PictureList* scanner,
                              const DetectionOptions& options, Progress& progress);

@@ -32,6 +32,8 @@ void add_simulate_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_plan_command(CLI::App& app);
 void add_acceptance_command(CLI::App& app);
+void add_board_command(CLI::App& app);
+void add_calibrate_command(CLI::App& app);
 void add_convert_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_rig_command(CLI::App& app);

@@ -8,6 +8,8 @@
 #include "cli/console_progress.h"
 #include "cli/option_visitor.h"
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/evaluation/compare_rigs.h"
+#include "pagesweep/io/rig_file.h"
 #include "pagesweep/report/report.h"
 
 namespace pagesweep::cli {
@@ -18,9 +20,16 @@ struct Arguments {
   std::filesystem::path result;
   std::filesystem::path truth;
   EvaluationOptions options;
+  RigComparisonOptions rigs;
 };
 
+void run_on_rigs(const Arguments& arguments) {
+  const auto figures = figures_of(compare_rigs(read_rig(arguments.result), read_rig(arguments.truth), arguments.rigs));
+  print_answer(arguments.common, nlohmann::ordered_json::parse(format_figures_json(figures)), format_table(figures));
+}
+
 void run(const Arguments& arguments) {
+  if (std::filesystem::is_regular_file(arguments.result)) return run_on_rigs(arguments);
   const ThreadLimit limit(arguments.common.threads);
   ConsoleProgress progress(arguments.common.quiet);
   const Evaluation evaluation = evaluate(arguments.result, arguments.truth, arguments.options, progress);
@@ -42,15 +51,22 @@ Prints the distances of the points to the true surface, the errors of the time v
 how many millimetres the print of each flat page is out of place. A figure that cannot be found
 says why. The result's report.html gets a section with the same figures and with maps of the
 errors.
+
+Of a rig it tells by how much points and places in the scan are off because of it, in a
+volume over the table, after the best rigid motion between the frames.
 )");
   const auto arguments = std::make_shared<Arguments>();
-  add_input(*command, "RESULT", arguments->result, "folder that scan or reconstruct wrote");
-  command->add_option("--truth", arguments->truth, "folder with truth.json")->required()->option_text("<folder>");
+  add_input(*command, "RESULT", arguments->result, "folder that scan or reconstruct wrote, or a rig");
+  command->add_option("--truth", arguments->truth, "folder with truth.json, or the true rig")
+      ->required()
+      ->option_text("<folder>");
   arguments->options.describe(OptionVisitor(*command, "Comparison"));
+  arguments->rigs.describe(OptionVisitor(*command, "Comparison of rigs"));
   add_common_options(*command, arguments->common);
   command->footer(
       "Examples:\n  pagesweep evaluate result --truth capture/truth\n"
-      "  pagesweep evaluate result --truth capture/truth --json > figures.json\n");
+      "  pagesweep evaluate result --truth capture/truth --json > figures.json\n"
+      "  pagesweep evaluate rig.json --truth true_rig.json\n");
   command->callback([arguments] { run(*arguments); });
 }
 

@@ -43,6 +43,8 @@ void add_commands(CLI::App& app) {
   add_evaluate_command(app);
   add_plan_command(app);
   add_acceptance_command(app);
+  add_board_command(app);
+  add_calibrate_command(app);
   add_convert_command(app);
   add_check_command(app);
   add_rig_command(app);

@@ -122,9 +122,10 @@ std::optional<ScannerModel> model_wanted(ScannerModelChoice choice) {
 
 void require_sound(const ScannerData& data) {
   if (data.poses.size() < fewest_poses)
-    throw Error(ErrorKind::bad_input,
-                fmt::format("the scanner and the cameras see the board together in {} poses, and at least {} are needed",
-                            data.poses.size(), fewest_poses));
+    throw Error(
+        ErrorKind::bad_input,
+        fmt::format("the scanner and the cameras see the board together in {} poses, and at least {} are needed",
+                    data.poses.size(), fewest_poses));
   if (is_mirrored(points_of(data)))
     throw Error(ErrorKind::bad_input, "the scanner's pictures are mirrored: switch off what flips them");
 }
@@ -139,9 +140,10 @@ void add_scanner(const CalibrationInput& input, const CalibrationOptions& option
   const auto wanted = model_wanted(options.scanner_model);
   const ScannerModel model = wanted ? *wanted : choose(data, trials);
   if (!fit(data, model))
-    throw no_result(fmt::format("the scanner's pictures do not determine it as {}: show the board at other heights and "
-                                "tilts as well",
-                                name_of(model)));
+    throw no_result(
+        fmt::format("the scanner's pictures do not determine it as {}: show the board at other heights and "
+                    "tilts as well",
+                    name_of(model)));
   if (data.poses.size() < pictures.pictures.size())
     warnings.push_back(fmt::format("{} of {} pictures of the scanner show a pose that the cameras see too",
                                    data.poses.size(), pictures.pictures.size()));

@@ -99,8 +99,12 @@ std::vector<Named> names_of(const Pushbroom&) {
 std::vector<Named> names_of(const RotatingLine&) {
   return {{"f", "px"}, {"cx", "px"}, {"k1", ""}, {"angle_step", "rad"}};
 }
-constexpr auto pose_names = std::to_array<Named>(
-    {{"turn_x", "rad"}, {"turn_y", "rad"}, {"turn_z", "rad"}, {"center_x", "mm"}, {"center_y", "mm"}, {"center_z", "mm"}});
+constexpr auto pose_names = std::to_array<Named>({{"turn_x", "rad"},
+                                                  {"turn_y", "rad"},
+                                                  {"turn_z", "rad"},
+                                                  {"center_x", "mm"},
+                                                  {"center_y", "mm"},
+                                                  {"center_z", "mm"}});
 
 /// Which of a camera's parameters stay as they are.
 std::vector<int> held_inside(const Camera&, LensModel lens) {
@@ -316,8 +320,8 @@ void Adjustment::describe(BundleSolution& solution) {
   problem_.Evaluate(wanted, &cost, nullptr, nullptr, &jacobian);
   solution.redundancy = jacobian.num_rows - jacobian.num_cols;
   solution.unit_sigma = std::sqrt(2 * cost / std::max(1.0, solution.redundancy));
-  solution.covariance = std::pow(solution.unit_sigma, 2) *
-                        inverse_of(normal_matrix(jacobian), solution.parameters, solution.problem);
+  solution.covariance =
+      std::pow(solution.unit_sigma, 2) * inverse_of(normal_matrix(jacobian), solution.parameters, solution.problem);
 }
 
 Eigen::Vector3d BoardShape::corner_mm(const Board& board, int corner) const {
@@ -328,8 +332,8 @@ std::optional<Eigen::Vector2d> Bundle::predict(int sensor, int pose, int corner)
   const auto see = [&](const auto& model) -> std::optional<Eigen::Vector2d> {
     const SensorBlock block = block_of(model);
     Eigen::Vector2d pixel;
-    const bool seen = projection::corner_pixel(projection_of(model), board, corner, block.inside.data(), block.pose.data(),
-                                               pose_block(rig_from_board[std::size_t(pose)]).data(),
+    const bool seen = projection::corner_pixel(projection_of(model), board, corner, block.inside.data(),
+                                               block.pose.data(), pose_block(rig_from_board[std::size_t(pose)]).data(),
                                                shape_block(shape).data(), pixel);
     return seen ? std::optional(pixel) : std::nullopt;
   };
@@ -346,12 +350,21 @@ BundleSolution solve(Bundle& bundle, const BundleOptions& options) {
   Adjustment adjustment(bundle, options);
   const ceres::Solver::Summary summary = adjustment.run();
   if (!summary.IsSolutionUsable())
-    throw no_result("the calibration did not get off its start values: do all pictures belong to the board's definition?");
+    throw no_result(
+        "the calibration did not get off its start values: do all pictures belong to the board's definition?");
   BundleSolution solution;
   solution.iterations = static_cast<int>(summary.iterations.size());
   if (options.with_covariance) adjustment.describe(solution);
   adjustment.store(bundle);
   return solution;
+}
+
+std::vector<std::string> parameter_names(const Scanner::Model& model) {
+  std::vector<std::string> names;
+  for (const Named& named : std::visit([](const auto& m) { return names_of(m); }, model))
+    names.emplace_back(named.name);
+  for (const Named& named : pose_names) names.emplace_back(named.name);
+  return names;
 }
 
 Eigen::MatrixXd parameter_jacobian(const Scanner::Model& model, const Eigen::Vector3d& rig_point) {

@@ -15,10 +15,10 @@
 
 namespace pagesweep {
 
-/// How a real board differs from its definition: stretched along y and shrunk along x by half of `stretch` each, and bent
-/// to z = sum_k bend[k] b_k(x, y), the products P_m(x) P_n(y) of Legendre polynomials with 2 <= m + n <= 4 over the
-/// board's extent. Heights in mm. What a pose can do as well, shifts and tilts, is not among them; nor is its size, which
-/// no picture tells.
+/// How a real board differs from its definition: stretched along y and shrunk along x by half of `stretch` each, and
+/// bent to z = sum_k bend[k] b_k(x, y), the products P_m(x) P_n(y) of Legendre polynomials with 2 <= m + n <= 4 over
+/// the board's extent. Heights in mm. What a pose can do as well, shifts and tilts, is not among them; nor is its size,
+/// which no picture tells.
 struct BoardShape {
   static constexpr int bends = 12;
   double stretch = 0;
@@ -47,7 +47,7 @@ constexpr auto names_of(LensModel) {
 struct Sensor {
   std::string name;
   Scanner::Model model;
-  double sigma_px = 1;          ///< standard deviation of a coordinate of its corners: its observations' weight
+  double sigma_px = 1;  ///< standard deviation of a coordinate of its corners: its observations' weight
   bool pose_is_held = false;
   bool inside_is_held = false;  ///< focal lengths, distortion, ...
 };
@@ -71,7 +71,8 @@ struct BundleOptions {
   LensModel lens = LensModel::full;
   bool fit_stretch = false;
   bool fit_bend = false;
-  double robust_scale = 0;    ///< in standard deviations; beyond it, errors count less and less (Cauchy); 0: least squares
+  double robust_scale =
+      0;  ///< in standard deviations; beyond it, errors count less and less (Cauchy); 0: least squares
   bool with_covariance = false;
 };
 
@@ -99,7 +100,10 @@ struct BundleSolution {
 /// \throws Error  if the start values are so far off that nothing can be computed
 BundleSolution solve(Bundle& bundle, const BundleOptions& options);
 
-/// d (pixel of a rig point) / d (parameters of a sensor), in the order in which solve() lists them.
+/// What a sensor of this kind has as parameters, in the order in which solve() lists them: "fx", ..., "center_z".
+std::vector<std::string> parameter_names(const Scanner::Model& model);
+
+/// d (pixel of a rig point) / d (parameters of a sensor), in the order of parameter_names(): 2 x their number.
 Eigen::MatrixXd parameter_jacobian(const Scanner::Model& model, const Eigen::Vector3d& rig_point);
 
 }  // namespace pagesweep

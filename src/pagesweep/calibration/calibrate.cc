@@ -53,7 +53,9 @@ void adjust(Bundle& bundle, const CalibrationOptions& options) {
   }
 }
 
-void move(Camera& camera, const Rigid3& new_from_old) { camera.cam_from_rig = camera.cam_from_rig * new_from_old.inverse(); }
+void move(Camera& camera, const Rigid3& new_from_old) {
+  camera.cam_from_rig = camera.cam_from_rig * new_from_old.inverse();
+}
 void move(Pushbroom& line, const Rigid3& new_from_old) {
   line.center = new_from_old * line.center;
   line.step = new_from_old.rotation * line.step;
@@ -65,8 +67,7 @@ void move(RotatingLine& line, const Rigid3& new_from_old) {
 }
 
 void move(Bundle& bundle, const Rigid3& new_from_old) {
-  for (Sensor& sensor : bundle.sensors)
-    std::visit([&](auto& model) { move(model, new_from_old); }, sensor.model);
+  for (Sensor& sensor : bundle.sensors) std::visit([&](auto& model) { move(model, new_from_old); }, sensor.model);
   for (Rigid3& rig_from_board : bundle.rig_from_board) rig_from_board = new_from_old * rig_from_board;
 }
 
@@ -124,7 +125,8 @@ int find_table_pose(const CalibrationInput& input, const Bundle& bundle, const s
   for (int k = 0; k < static_cast<int>(input.poses.size()); ++k) {
     if (!wanted.empty() && input.poses[std::size_t(k)] != wanted) continue;
     if (is_seen(k)) return k;
-    if (!wanted.empty()) throw no_result(fmt::format("the board is not seen in the pictures of the table, '{}'", wanted));
+    if (!wanted.empty())
+      throw no_result(fmt::format("the board is not seen in the pictures of the table, '{}'", wanted));
   }
   throw std::invalid_argument(fmt::format("--table-pose: no picture is called '{}'", wanted));
 }

@@ -27,7 +27,7 @@ struct CalibrationOptions {
   bool fit_bend = false;
   bool fit_stretch = false;
   bool cross_validate = false;
-  double outlier_sigmas = 4;
+  double outlier_sigmas = 5;
   std::string table_pose;
   double board_thickness_mm = 0;
 
@@ -39,7 +39,8 @@ struct CalibrationOptions {
     visit("fit-stretch", fit_stretch, "", "estimate how much longer the board was printed along y than along x");
     visit("cross-validate", cross_validate, "", "leave out each pose in turn and tell how well it is predicted");
     visit("outlier-sigmas", outlier_sigmas, "", "a corner farther off, in standard deviations, is left out and listed");
-    visit("table-pose", table_pose, "", "name of the pictures that show the board lying on the table; empty: the first");
+    visit("table-pose", table_pose, "",
+          "name of the pictures that show the board lying on the table; empty: the first");
     visit("board-thickness-mm", board_thickness_mm, "mm", "of the board, by which the table lies below its print");
   }
 };
@@ -69,18 +70,18 @@ struct CalibrationInput {
 /// How well one model of the scanner predicts pictures that it was not fitted to.
 struct ScannerTrial {
   ScannerModel model = ScannerModel::pushbroom;
-  double rms_px = 0;    ///< on the poses left out; NaN: it could not be fitted
+  double rms_px = 0;  ///< on the poses left out; NaN: it could not be fitted
   bool chosen = false;
 };
 
 /// A finished calibration.
 struct Calibration {
   Rig rig;
-  Bundle bundle;                      ///< with every observation, outliers included
-  BundleSolution solution;            ///< in the rig frame
-  int table_pose = 0;                 ///< index of the pose that lies on the table
-  std::vector<ScannerTrial> trials;   ///< if the scanner's model was to be chosen
-  std::vector<double> left_out_px;    ///< a pose each: rms [px] when it was left out; empty: not asked for, NaN: not seen
+  Bundle bundle;                     ///< with every observation, outliers included
+  BundleSolution solution;           ///< in the rig frame
+  int table_pose = 0;                ///< index of the pose that lies on the table
+  std::vector<ScannerTrial> trials;  ///< if the scanner's model was to be chosen
+  std::vector<double> left_out_px;  ///< a pose each: rms [px] when it was left out; empty: not asked for, NaN: not seen
   std::vector<std::string> warnings;  ///< pictures and poses that were left out, and why
 };
 
@@ -88,8 +89,8 @@ struct Calibration {
 /// then one least-squares adjustment of everything.
 ///
 /// Rig frame: z = 0 is the table and z points to the cameras; the origin is below the middle of the board in the table
-/// pose. With a scanner y is the direction in which its rows count; without, the axis of the board that comes closest to
-/// the line from the first camera to the second one; with one camera, the one closest to its rows, downwards.
+/// pose. With a scanner y is the direction in which its rows count; without, the axis of the board that comes closest
+/// to the line from the first camera to the second one; with one camera, the one closest to its rows, downwards.
 ///
 /// \throws Error                  if the pictures cannot give a calibration; the message names the cause
 /// \throws std::invalid_argument  if an option cannot be meant

@@ -113,7 +113,9 @@ class LocalView {
  private:
   Eigen::Vector2d image(const Eigen::Vector2d& p) const {
     const auto& h = px_from_squares_;
-    const auto row = [&](int i) { return h.at<double>(i, 0) * p.x() + h.at<double>(i, 1) * p.y() + h.at<double>(i, 2); };
+    const auto row = [&](int i) {
+      return h.at<double>(i, 0) * p.x() + h.at<double>(i, 1) * p.y() + h.at<double>(i, 2);
+    };
     return Eigen::Vector2d(row(0), row(1)) / row(2);
   }
   cv::Mat px_from_squares_;
@@ -224,7 +226,8 @@ std::string why_no_markers(const cv::Mat& picture, const Board& board, bool& wro
 std::string why_inconsistent(const cv::Mat& picture, const Board& board, std::size_t seen, bool& wrong_board) {
   wrong_board = true;
   const int columns = columns_that_fit(picture, board, seen);
-  const std::string what = fmt::format("its markers do not lie as on a board of {} x {} squares", board.columns, board.rows);
+  const std::string what =
+      fmt::format("its markers do not lie as on a board of {} x {} squares", board.columns, board.rows);
   return columns > 0 && columns != board.columns ? fmt::format("{} but as on one of {} squares across", what, columns)
                                                  : what;
 }
@@ -271,8 +274,8 @@ BoardView fit_grid(ImageView<const std::uint8_t> image, const Board& board, cons
     const int across = board.columns - 1;
     guess.upper_right_is_black = is_black(number % across + 1, number / across + 1);
     const double radius_px = 0.25 * board.marker_mm / board.square_mm * (guess.right_px.norm() + guess.up_px.norm());
-    const auto fit = board.type == BoardType::circles ? fit_disc(image, guess.pixel, radius_px)
-                                                      : fit_corner(image, guess);
+    const auto fit =
+        board.type == BoardType::circles ? fit_disc(image, guess.pixel, radius_px) : fit_corner(image, guess);
     if (fit) found.push_back({number, *fit});
   }
   return view_of(std::move(found));
@@ -300,7 +303,8 @@ void put_in_order(const cv::Mat& picture, const Board& board, std::vector<cv::Po
                        pixels.begin() + std::ptrdiff_t((rows - 1 - j) * across));
   double black = 0, white = 0;
   for (std::size_t j = 0; j + 1 < rows; ++j)
-    for (std::size_t i = 0; i + 1 < across; ++i) ((i + j) % 2 == 0 ? black : white) += gray_near(picture, middle_of(i, j));
+    for (std::size_t i = 0; i + 1 < across; ++i)
+      ((i + j) % 2 == 0 ? black : white) += gray_near(picture, middle_of(i, j));
   if (black > white) std::reverse(pixels.begin(), pixels.end());  // half a turn
 }
 
@@ -348,9 +352,10 @@ BoardView detect_any(ImageView<const std::uint8_t> image, const Board& board) {
 
 std::string problem_of(const BoardView& view, const DetectionOptions& options) {
   if (view.clipped > options.most_clipped)
-    return fmt::format("overexposed: {:.0f} % of the board's white has the highest gray value, and edges in its glare are "
-                       "out of place; shorten the exposure",
-                       100 * view.clipped);
+    return fmt::format(
+        "overexposed: {:.0f} % of the board's white has the highest gray value, and edges in its glare are "
+        "out of place; shorten the exposure",
+        100 * view.clipped);
   if (view.blur_px > options.most_blur_px)
     return fmt::format("blurred: its edges have a standard deviation of {:.1f} px; focus, or keep the board still",
                        view.blur_px);

@@ -89,7 +89,8 @@ template <class Wanted>
 std::optional<Neighbourhood> gather(ImageView<const std::uint8_t> image, const Eigen::Vector2d& pixel, double radius,
                                     const Wanted& wanted) {
   if (!pixel.allFinite() || !(radius < 500)) return std::nullopt;
-  const int left = static_cast<int>(std::floor(pixel.x() - radius)), top = static_cast<int>(std::floor(pixel.y() - radius));
+  const int left = static_cast<int>(std::floor(pixel.x() - radius)),
+            top = static_cast<int>(std::floor(pixel.y() - radius));
   const int side = 2 * static_cast<int>(std::ceil(radius)) + 2;
   Neighbourhood around;
   for (int y = top; y < top + side; ++y)
@@ -181,8 +182,8 @@ std::optional<CornerFit> fit_corner(ImageView<const std::uint8_t> image, const C
   if (!found) return std::nullopt;
   const Row<9>& p = found->parameters;
   const double contrast = 2 * std::abs(p[8]), side = std::min(guess.right_px.norm(), guess.up_px.norm());
-  const bool plausible = (p.head<2>() - guess.pixel).norm() < 0.3 * side && p[8] * half > 0 && contrast > least_contrast &&
-                         std::abs(p[4]) < 0.3 * side;
+  const bool plausible = (p.head<2>() - guess.pixel).norm() < 0.3 * side && p[8] * half > 0 &&
+                         contrast > least_contrast && std::abs(p[4]) < 0.3 * side;
   if (!plausible) return std::nullopt;
   return CornerFit{p.head<2>(), std::max(std::abs(p[4]), least_blur_px), contrast, found->rms / contrast,
                    around->clipped};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the models of docs/formats.md see, written for numbers that carry their derivatives (Ceres' jets). A test compares
-// them with camera/.
+// What the models of docs/formats.md see, written for numbers that carry their derivatives (Ceres' jets). A test
+// compares them with camera/.
 
 #include <ceres/rotation.h>
 
@@ -88,10 +88,8 @@ struct TurningLine {
 template <class T>
 Vector3<T> board_point(const Eigen::Vector2d& place, const Eigen::Vector2d& size, const T* shape) {
   const double x = 2 * place.x() / size.x() - 1, y = 2 * place.y() / size.y() - 1;
-  const double px[5] = {1, x, 1.5 * x * x - 0.5, 2.5 * x * x * x - 1.5 * x,
-                        (35 * x * x * x * x - 30 * x * x + 3) / 8};
-  const double py[5] = {1, y, 1.5 * y * y - 0.5, 2.5 * y * y * y - 1.5 * y,
-                        (35 * y * y * y * y - 30 * y * y + 3) / 8};
+  const double px[5] = {1, x, 1.5 * x * x - 0.5, 2.5 * x * x * x - 1.5 * x, (35 * x * x * x * x - 30 * x * x + 3) / 8};
+  const double py[5] = {1, y, 1.5 * y * y - 0.5, 2.5 * y * y * y - 1.5 * y, (35 * y * y * y * y - 30 * y * y + 3) / 8};
   T z(0);
   int k = 0;
   for (int degree = 2; degree <= 4; ++degree)
@@ -101,8 +99,8 @@ Vector3<T> board_point(const Eigen::Vector2d& place, const Eigen::Vector2d& size
           0.5 * size.y() + from_middle.y() * (1.0 + 0.5 * shape[0]), z};
 }
 
-/// Where a board's corner is seen. The middle of a circle's picture is not the picture of its middle: to second order it
-/// lies twice as far off it as the mean of four points of the rim does.
+/// Where a board's corner is seen. The middle of a circle's picture is not the picture of its middle: to second order
+/// it lies twice as far off it as the mean of four points of the rim does.
 template <class Projection, class T>
 bool corner_pixel(const Projection& project, const Board& board, int corner, const T* inside, const T* pose,
                   const T* rig_from_board, const T* shape, Vector2<T>& pixel) {
@@ -118,7 +116,8 @@ bool corner_pixel(const Projection& project, const Board& board, int corner, con
   if (board.type != BoardType::circles) return true;
   const Eigen::Vector2d radius = 0.5 * board.marker_mm * board.print_scale;
   Vector2<T> mean = Vector2<T>::Zero(), rim;
-  for (const Eigen::Vector2d& way : {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0), Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
+  for (const Eigen::Vector2d& way :
+       {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0), Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
     if (!see(place + way.cwiseProduct(radius), rim)) return false;
     mean += 0.25 * rim;
   }

@@ -38,16 +38,17 @@ std::string commonest_problem(const SensorPictures& pictures, bool& wrong_board)
 }
 
 void require_pictures(const SensorPictures& pictures) {
-  const auto usable = static_cast<std::size_t>(
-      std::ranges::count_if(pictures.pictures, [](const BoardPicture& picture) { return picture.view.problem.empty(); }));
+  const auto usable = static_cast<std::size_t>(std::ranges::count_if(
+      pictures.pictures, [](const BoardPicture& picture) { return picture.view.problem.empty(); }));
   if (usable >= fewest_pictures) return;
   bool wrong_board = false;
   const std::string problem = commonest_problem(pictures, wrong_board);
-  const std::string count = pictures.pictures.size() == 1
-                                ? fmt::format("{}: there is only one picture", pictures.name)
-                                : fmt::format("{}: {} of {} pictures show the board", pictures.name, usable,
-                                              pictures.pictures.size());
-  const std::string need = fmt::format("at least {} are needed, tilted differently; 15 to 20 are better", fewest_pictures);
+  const std::string count =
+      pictures.pictures.size() == 1
+          ? fmt::format("{}: there is only one picture", pictures.name)
+          : fmt::format("{}: {} of {} pictures show the board", pictures.name, usable, pictures.pictures.size());
+  const std::string need =
+      fmt::format("at least {} are needed, tilted differently; 15 to 20 are better", fewest_pictures);
   throw Error(wrong_board ? ErrorKind::bad_input : ErrorKind::no_result,
               problem.empty() ? fmt::format("{}; {}", count, need) : fmt::format("{}; {} ({})", count, need, problem));
 }
@@ -99,16 +100,17 @@ void require_tilts(const CameraStart& start) {
     for (const auto& [other, b] : start.cam_from_board)
       widest = std::max(widest, std::acos(std::clamp(a.rotation.col(2).dot(b.rotation.col(2)), -1.0, 1.0)));
   if (widest < least_tilt_rad)
-    throw no_result(
-        fmt::format("{}: all poses of the board are parallel, within {:.1f} degrees: focal length and distance cannot be told "
-                    "apart; tilt the board by 20 to 40 degrees, in different directions",
-                    start.camera.name, widest * 180 / std::numbers::pi));
+    throw no_result(fmt::format(
+        "{}: all poses of the board are parallel, within {:.1f} degrees: focal length and distance cannot be told "
+        "apart; tilt the board by 20 to 40 degrees, in different directions",
+        start.camera.name, widest * 180 / std::numbers::pi));
 }
 
 CameraStart start_camera(const CalibrationInput& input, const SensorPictures& pictures,
                          const CalibrationOptions& options) {
   const auto homographies = find_homographies(input, pictures);
-  Bundle bundle{.board = input.board, .shape = {}, .sensors = {}, .rig_from_board = {}, .pose_is_held = {}, .observations = {}};
+  Bundle bundle{
+      .board = input.board, .shape = {}, .sensors = {}, .rig_from_board = {}, .pose_is_held = {}, .observations = {}};
   const Camera guess = first_guess(pictures, homographies);
   const Eigen::Vector3d to_image(1 / guess.fx, 1 / guess.fy, 1);
   bundle.sensors.push_back({pictures.name, guess, 1, true, false});
@@ -185,14 +187,14 @@ std::vector<int> find_contradictions(const CalibrationInput& input, const std::m
     if (agree(found.inverse(), agreed, distance_mm)) swapped.push_back(pose);
   }
   if (!swapped.empty() && 2 * swapped.size() >= odd.size())
-    throw Error(ErrorKind::bad_input,
-                fmt::format("the pictures of {} and {} are swapped in {} of {} poses: {}", from, to, swapped.size(),
-                            relative.size(), list_of(input, swapped)));
+    throw Error(ErrorKind::bad_input, fmt::format("the pictures of {} and {} are swapped in {} of {} poses: {}", from,
+                                                  to, swapped.size(), relative.size(), list_of(input, swapped)));
   if (3 * odd.size() > relative.size())
-    throw Error(ErrorKind::bad_input,
-                fmt::format("{} of {} poses contradict the others about where {} and {} are to each other: pictures of the "
-                            "same name must show the board in the same place, none of them mirrored (among them {})",
-                            odd.size(), relative.size(), from, to, list_of(input, odd)));
+    throw Error(
+        ErrorKind::bad_input,
+        fmt::format("{} of {} poses contradict the others about where {} and {} are to each other: pictures of the "
+                    "same name must show the board in the same place, none of them mirrored (among them {})",
+                    odd.size(), relative.size(), from, to, list_of(input, odd)));
   if (!odd.empty())
     warnings.push_back(fmt::format("left out of {}: {}, which contradict what {} sees", to, list_of(input, odd), from));
   return odd;
@@ -200,10 +202,11 @@ std::vector<int> find_contradictions(const CalibrationInput& input, const std::m
 
 void require_common_poses(const std::map<int, Rigid3>& relative, const std::string& from, const std::string& to) {
   if (relative.size() >= 2) return;
-  throw Error(ErrorKind::bad_input,
-              fmt::format("{} and {} see the board together in {} poses, and at least 2 are needed: pictures that belong "
-                          "together must have the same name, or be as many in each folder",
-                          from, to, relative.size()));
+  throw Error(
+      ErrorKind::bad_input,
+      fmt::format("{} and {} see the board together in {} poses, and at least 2 are needed: pictures that belong "
+                  "together must have the same name, or be as many in each folder",
+                  from, to, relative.size()));
 }
 
 }  // namespace
@@ -216,7 +219,8 @@ Bundle start_cameras(const CalibrationInput& input, const CalibrationOptions& op
     if (!pictures.is_scanner) starts.push_back(start_camera(input, pictures, options));
   }
   if (starts.empty()) throw std::invalid_argument("a calibration needs at least one camera");
-  Bundle bundle{.board = input.board, .shape = {}, .sensors = {}, .rig_from_board = {}, .pose_is_held = {}, .observations = {}};
+  Bundle bundle{
+      .board = input.board, .shape = {}, .sensors = {}, .rig_from_board = {}, .pose_is_held = {}, .observations = {}};
   bundle.rig_from_board.resize(input.poses.size());
   bundle.pose_is_held.assign(input.poses.size(), false);
   std::vector<bool> is_known(input.poses.size(), false);

@@ -69,7 +69,8 @@ std::optional<Eigen::Matrix<double, 3, 4>> find_projection(const ScanPoints& poi
 
 /// A frame camera from its projection matrix: rows of K R orthogonalised from the last one up.
 Camera camera_of(const Eigen::Matrix<double, 3, 4>& projection, const ScanPoints& points) {
-  const Eigen::RowVector3d a = projection.row(0).head<3>(), b = projection.row(1).head<3>(), c = projection.row(2).head<3>();
+  const Eigen::RowVector3d a = projection.row(0).head<3>(), b = projection.row(1).head<3>(),
+                           c = projection.row(2).head<3>();
   Camera camera;
   camera.width = points.width, camera.height = points.height;
   camera.cx = a.dot(c), camera.cy = b.dot(c);
@@ -87,8 +88,8 @@ Camera camera_of(const Eigen::Matrix<double, 3, 4>& projection, const ScanPoints
   return camera;
 }
 
-/// Row v = a . X + b, and (u - cx) / f = X_c / Z_c as a quotient of two linear functions of X, alpha and beta; their rows
-/// are R's, as seen along the step.
+/// Row v = a . X + b, and (u - cx) / f = X_c / Z_c as a quotient of two linear functions of X, alpha and beta; their
+/// rows are R's, as seen along the step.
 struct PushbroomForms {
   Eigen::Vector4d row, alpha, beta;
 };
@@ -110,7 +111,8 @@ std::optional<PushbroomForms> find_pushbroom_forms(const ScanPoints& points) {
   if (!solution) return std::nullopt;
   const Eigen::Matrix4d to_normal = in_space.matrix();
   const Eigen::Vector4d row = to_normal.transpose() * x.colPivHouseholderQr().solve(rows);
-  Eigen::Vector4d alpha = to_normal.transpose() * solution->head<4>(), beta = to_normal.transpose() * solution->tail<4>();
+  Eigen::Vector4d alpha = to_normal.transpose() * solution->head<4>(),
+                  beta = to_normal.transpose() * solution->tail<4>();
   alpha = alpha / in_picture.scale + in_picture.middle.x() * beta;  // u = u_n / scale + middle
   const double depth = beta.dot(in_space.middle.homogeneous());
   if (depth < 0) alpha = -alpha, beta = -beta;

@@ -22,23 +22,20 @@ std::string problem_of_symmetry(const Board& board) {
 
 }  // namespace
 
-int Board::corner_count() const {
-  return type == BoardType::circles ? columns * rows : (columns - 1) * (rows - 1);
-}
+int Board::corner_count() const { return type == BoardType::circles ? columns * rows : (columns - 1) * (rows - 1); }
 
 Eigen::Vector2d Board::corner_mm(int corner) const {
   const int across = type == BoardType::circles ? columns : columns - 1;
   const int i = corner % across, j = corner / across;
   // Of circles, the top row and every second one below it begin at the left; the number of rows is odd.
-  const Eigen::Vector2d place = type == BoardType::circles ? Eigen::Vector2d(2 * i + j % 2, j)
-                                                            : Eigen::Vector2d(i + 1, j + 1);
+  const Eigen::Vector2d place =
+      type == BoardType::circles ? Eigen::Vector2d(2 * i + j % 2, j) : Eigen::Vector2d(i + 1, j + 1);
   return square_mm * place.cwiseProduct(print_scale);
 }
 
 Eigen::Vector2d Board::size_mm() const {
-  const Eigen::Vector2d squares = type == BoardType::circles
-                                      ? Eigen::Vector2d(2 * columns - 1, rows - 1)
-                                      : Eigen::Vector2d(columns, rows);
+  const Eigen::Vector2d squares =
+      type == BoardType::circles ? Eigen::Vector2d(2 * columns - 1, rows - 1) : Eigen::Vector2d(columns, rows);
   return square_mm * squares.cwiseProduct(print_scale);
 }
 

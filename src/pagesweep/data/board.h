@@ -21,11 +21,11 @@ constexpr auto names_of(BoardType) { return std::array<std::string_view, 3>{"cha
 
 /// A flat calibration target.
 ///
-/// Board frame: x to the right and y up as printed, z out of the paper, right-handed; origin at the lower left corner of
-/// the lower left square (of the lower left circle's centre for circles); millimetres.
+/// Board frame: x to the right and y up as printed, z out of the paper, right-handed; origin at the lower left corner
+/// of the lower left square (of the lower left circle's centre for circles); millimetres.
 ///
-/// Squares are counted from there: square (i, j) is black if i + j is even. Markers are numbered row by row from the top
-/// left, as OpenCV did until version 4.6.
+/// Squares are counted from there: square (i, j) is black if i + j is even. Markers are numbered row by row from the
+/// top left, as OpenCV did until version 4.6.
 struct Board {
   BoardType type = BoardType::charuco;
   std::string dictionary = "DICT_5X5_1000";  ///< of the markers, by OpenCV's name
