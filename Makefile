@@ -62,7 +62,6 @@ results: build  ## measure every figure of docs/results.md; table and build/resu
 
 .PHONY: bench
 bench: setup  ## measure how long everything takes; table and build/bench/results.json
-	scripts/install-dependencies --bench
 	$(call build_preset,bench)
 	scripts/bench
 

@@ -91,6 +91,8 @@ void add_board_options(CLI::App& command, Arguments& arguments) {
   visit("square-mm", arguments.board.square_mm, "mm",
         "side of a square; for circles: distance of rows, which is half the distance within a row");
   visit("marker-mm", arguments.board.marker_mm, "mm", "side of a marker; for circles: their diameter");
+  visit("legacy-pattern", arguments.board.legacy_pattern, "",
+        "a ChArUco board with an even number of rows has a white square at the upper left, as with OpenCV before 4.6");
   visit("paper", arguments.paper, "",
         "A0 to A6, letter, legal, tabloid or a size in mm like 420x297; left out: as large as the board needs");
   command.add_option("--measured-mm", arguments.measured_mm)

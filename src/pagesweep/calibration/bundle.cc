@@ -131,9 +131,22 @@ struct CornerError {
   int corner;
   Eigen::Vector2d pixel;
   double weight;
+  std::array<double, shape_size> known_shape;
 
+  /// With the board's shape as an unknown.
   template <class T>
   bool operator()(const T* inside, const T* pose, const T* rig_from_board, const T* shape, T* residual) const {
+    return compare(inside, pose, rig_from_board, shape, residual);
+  }
+  /// With a shape that is known: a third fewer derivatives.
+  template <class T>
+  bool operator()(const T* inside, const T* pose, const T* rig_from_board, T* residual) const {
+    return compare(inside, pose, rig_from_board, known_shape.data(), residual);
+  }
+
+ private:
+  template <class T, class S>
+  bool compare(const T* inside, const T* pose, const T* rig_from_board, const S* shape, T* residual) const {
     projection::Vector2<T> image;
     if (!projection::corner_pixel(project, *board, corner, inside, pose, rig_from_board, shape, image)) return false;
     residual[0] = (pixel.x() - image.x()) * weight;
@@ -143,10 +156,14 @@ struct CornerError {
 };
 
 template <class Projection>
-ceres::CostFunction* make_cost(const Projection& project, const Bundle& bundle, const Observation& seen, double sigma) {
+ceres::CostFunction* make_cost(const Projection& project, const Bundle& bundle, const Observation& seen,
+                               bool shape_is_known) {
   using Error = CornerError<Projection>;
-  return new ceres::AutoDiffCostFunction<Error, 2, Projection::inside, 6, 6, shape_size>(
-      new Error{project, &bundle.board, seen.corner, seen.pixel, 1 / sigma});
+  constexpr int inside = Projection::inside;
+  const double weight = 1 / bundle.sensors[std::size_t(seen.sensor)].sigma_px;
+  auto* error = new Error{project, &bundle.board, seen.corner, seen.pixel, weight, shape_block(bundle.shape)};
+  if (shape_is_known) return new ceres::AutoDiffCostFunction<Error, 2, inside, 6, 6>(error);
+  return new ceres::AutoDiffCostFunction<Error, 2, inside, 6, 6, shape_size>(error);
 }
 
 /// The problem as Ceres sees it, with the numbers that it works on.
@@ -199,14 +216,15 @@ class Adjustment {
     for (const Observation& seen : bundle_.observations) {
       if (!seen.used) continue;
       const auto sensor = static_cast<std::size_t>(seen.sensor);
-      ceres::CostFunction* cost = std::visit(
-          [&](const auto& model) {
-            return make_cost(projection_of(model), bundle_, seen, bundle_.sensors[sensor].sigma_px);
-          },
-          bundle_.sensors[sensor].model);
+      const bool shape_is_known = !options_.fit_bend && !options_.fit_stretch;
+      ceres::CostFunction* cost =
+          std::visit([&](const auto& model) { return make_cost(projection_of(model), bundle_, seen, shape_is_known); },
+                     bundle_.sensors[sensor].model);
       ceres::LossFunction* loss = options_.robust_scale > 0 ? new ceres::CauchyLoss(options_.robust_scale) : nullptr;
-      problem_.AddResidualBlock(cost, loss, sensors_[sensor].inside.data(), sensors_[sensor].pose.data(),
-                                poses_[std::size_t(seen.pose)].data(), shape_.data());
+      std::vector<double*> blocks{sensors_[sensor].inside.data(), sensors_[sensor].pose.data(),
+                                  poses_[std::size_t(seen.pose)].data()};
+      if (!shape_is_known) blocks.push_back(shape_.data());
+      problem_.AddResidualBlock(cost, loss, blocks);
     }
   }
 
@@ -235,10 +253,7 @@ class Adjustment {
     if (!options_.fit_stretch) held.push_back(0);
     if (!options_.fit_bend)
       for (int k = 1; k < shape_size; ++k) held.push_back(k);
-    if (held.size() == shape_size)
-      problem_.SetParameterBlockConstant(shape_.data());
-    else if (!held.empty())
-      problem_.SetManifold(shape_.data(), new ceres::SubsetManifold(shape_size, held));
+    if (!held.empty()) problem_.SetManifold(shape_.data(), new ceres::SubsetManifold(shape_size, held));
   }
 
   const Bundle& bundle_;

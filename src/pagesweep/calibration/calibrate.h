@@ -28,7 +28,7 @@ struct CalibrationOptions {
   bool fit_stretch = false;
   bool cross_validate = false;
   double outlier_sigmas = 5;
-  std::string table_pose;
+  std::string table_pose = {};
   double board_thickness_mm = 0;
 
   template <class Visitor>

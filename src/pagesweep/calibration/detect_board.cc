@@ -44,24 +44,34 @@ struct Marker {
   }
 };
 
-/// Whether numbers are plausible at all is the caller's question: a marker may be misread.
-std::vector<Marker> find_markers(const cv::Mat& picture, const Board& board, const std::string& dictionary) {
+/// Markers as the picture shows them.
+struct SeenMarkers {
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> numbers;
+};
+
+SeenMarkers read_markers(const cv::Mat& picture, const std::string& dictionary) {
   const auto parameters = cv::aruco::DetectorParameters::create();
   parameters->adaptiveThreshWinSizeMax = 43;  // also for markers of a few hundred px
   parameters->minMarkerPerimeterRate = 0.01;  // and boards of several hundred squares
-  cv::aruco::detectMarkers(picture, dictionary_named(dictionary), corners, numbers, parameters);
-  const auto places = marker_places(board.columns, board.rows);
+  SeenMarkers seen;
+  cv::aruco::detectMarkers(picture, dictionary_named(dictionary), seen.corners, seen.numbers, parameters);
+  return seen;
+}
+
+/// Where a board has the markers. Whether that is plausible is the caller's question: a marker may be misread.
+std::vector<Marker> place_markers(const SeenMarkers& seen, const Board& board) {
+  const auto places = marker_places(board);
   const float margin = static_cast<float>(0.5 * (1 - board.marker_mm / board.square_mm));
   std::vector<Marker> markers;
-  for (std::size_t k = 0; k < numbers.size(); ++k) {
-    if (numbers[k] < 0 || static_cast<std::size_t>(numbers[k]) >= places.size()) continue;
-    Marker marker{places[std::size_t(numbers[k])], {}, {}};
+  for (std::size_t k = 0; k < seen.numbers.size(); ++k) {
+    const int number = seen.numbers[k];
+    if (number < 0 || static_cast<std::size_t>(number) >= places.size()) continue;
+    Marker marker{places[std::size_t(number)], {}, {}};
     const auto left = float(marker.place.column) + margin, low = float(marker.place.row) + margin;
     const auto right = left + 1 - 2 * margin, high = low + 1 - 2 * margin;
     marker.squares = {cv::Point2f(left, high), {right, high}, {right, low}, {left, low}};  // clockwise as printed
-    std::copy_n(corners[k].begin(), 4, marker.pixels.begin());
+    std::copy_n(seen.corners[k].begin(), 4, marker.pixels.begin());
     markers.push_back(marker);
   }
   return markers;
@@ -121,8 +131,6 @@ class LocalView {
   cv::Mat px_from_squares_;
 };
 
-bool is_black(int column, int row) { return (column + row) % 2 == 0; }
-
 struct FittedCorner {
   int number;
   CornerFit fit;
@@ -175,7 +183,7 @@ BoardView fit_charuco(ImageView<const std::uint8_t> image, const Board& board, c
     const LocalView local(pairs_of(near));
     if (local.empty()) continue;
     CornerGuess guess = local.guess_at(place);
-    guess.upper_right_is_black = is_black(column, row);
+    guess.upper_right_is_black = board.is_black(column, row);
     guess.margin = 0.5 * (1 - board.marker_mm / board.square_mm);
     if (const auto fit = fit_corner(image, guess)) found.push_back({number, *fit});
   }
@@ -185,47 +193,42 @@ BoardView fit_charuco(ImageView<const std::uint8_t> image, const Board& board, c
 // ---- why a ChArUco board is not found ----
 
 std::size_t count_markers(const cv::Mat& picture, const std::string& dictionary) {
-  std::vector<std::vector<cv::Point2f>> corners;
-  std::vector<int> numbers;
-  cv::aruco::detectMarkers(picture, dictionary_named(dictionary), corners, numbers);
-  return numbers.size();
+  return read_markers(picture, dictionary).numbers.size();
 }
 
 /// The number of squares across with which most of the markers found lie where they should; 0 if there is none.
-int columns_that_fit(const cv::Mat& picture, const Board& board, std::size_t markers_seen) {
+int columns_that_fit(const SeenMarkers& seen, const Board& board) {
   Board other = board;
   for (other.columns = 3; other.columns <= 60; ++other.columns) {
     other.rows = std::max(board.rows, 2 * 1000 / other.columns);  // only the numbering from the top matters
     if ((other.rows - board.rows) % 2 != 0) ++other.rows;         // which begins with the square's colour
-    const auto markers = find_markers(picture, other, board.dictionary);
-    if (consistent_markers(markers).size() * 10 >= markers_seen * 8) return other.columns;
+    if (consistent_markers(place_markers(seen, other)).size() * 10 >= seen.numbers.size() * 8) return other.columns;
   }
   return 0;
 }
 
+/// Other explanations of a picture without the board's markers compete by the number of markers that they find: small
+/// markers are seen by chance in anything.
 std::string why_no_markers(const cv::Mat& picture, const Board& board, bool& wrong_board) {
   cv::Mat mirrored;
   cv::flip(picture, mirrored, 1);
-  wrong_board = true;
-  if (count_markers(mirrored, board.dictionary) >= fewest_markers)
-    return "the picture is mirrored: its markers can be read only in a mirror; switch off the camera's flip";
-  std::string best;
-  std::size_t most = fewest_markers;
+  std::string best =
+      "the picture is mirrored: its markers can be read only in a mirror; switch off what flips the camera's pictures";
+  std::size_t most = count_markers(mirrored, board.dictionary);
   for (const std::string& name : dictionary_names()) {
-    // Small dictionaries are beginnings of larger ones; 16h5 is seen in any pattern.
-    if (name == board.dictionary || name == "DICT_APRILTAG_16h5") continue;
-    const std::size_t count = count_markers(picture, name);
-    if (count > most) most = count, best = name;
+    const std::size_t count = name == board.dictionary ? 0 : count_markers(picture, name);
+    if (count <= most) continue;  // a small dictionary is the beginning of a larger one and comes first
+    most = count;
+    best = fmt::format("its markers are of {}, and the board's definition says {}", name, board.dictionary);
   }
-  if (!best.empty())
-    return fmt::format("its markers are of {}, and the board's definition says {}", best, board.dictionary);
-  wrong_board = false;
-  return fmt::format("no marker of {} is seen: is the board in the picture, in focus and lit?", board.dictionary);
+  wrong_board = most >= fewest_markers;
+  return wrong_board
+             ? best
+             : fmt::format("no marker of {} is seen: is the board in the picture, in focus and lit?", board.dictionary);
 }
 
-std::string why_inconsistent(const cv::Mat& picture, const Board& board, std::size_t seen, bool& wrong_board) {
-  wrong_board = true;
-  const int columns = columns_that_fit(picture, board, seen);
+std::string why_inconsistent(const SeenMarkers& seen, const Board& board) {
+  const int columns = columns_that_fit(seen, board);
   const std::string what =
       fmt::format("its markers do not lie as on a board of {} x {} squares", board.columns, board.rows);
   return columns > 0 && columns != board.columns ? fmt::format("{} but as on one of {} squares across", what, columns)
@@ -239,19 +242,29 @@ BoardView unusable(std::string problem, bool wrong_board = false) {
   return view;
 }
 
+/// Both kinds of boards number their markers almost alike, so some fit the wrong kind, but more fit the right one.
+bool is_of_other_pattern(const SeenMarkers& seen, Board board, std::size_t consistent) {
+  if (board.rows % 2 != 0) return false;
+  board.legacy_pattern = !board.legacy_pattern;
+  return consistent_markers(place_markers(seen, board)).size() > consistent + consistent / 100;
+}
+
 BoardView detect_charuco(ImageView<const std::uint8_t> image, const Board& board) {
   const cv::Mat picture = matrix_of(image);
-  const auto markers = find_markers(picture, board, board.dictionary);
+  const SeenMarkers seen = read_markers(picture, board.dictionary);
   bool wrong = false;
-  if (markers.size() < fewest_markers) {
+  if (seen.numbers.size() < fewest_markers) {
     const std::string why = why_no_markers(picture, board, wrong);
     return unusable(why, wrong);
   }
-  const auto consistent = consistent_markers(markers);
-  if (consistent.size() < fewest_markers || 2 * consistent.size() < markers.size()) {
-    const std::string why = why_inconsistent(picture, board, markers.size(), wrong);
-    return unusable(why, wrong);
-  }
+  const auto consistent = consistent_markers(place_markers(seen, board));
+  if (is_of_other_pattern(seen, board, consistent.size()))
+    return unusable(fmt::format("the board's upper left square has the other colour: OpenCV changed its boards with "
+                                "version 4.6; set \"legacy_pattern\" to {} in the board's definition",
+                                !board.legacy_pattern),
+                    true);
+  if (consistent.size() < fewest_markers || 2 * consistent.size() < seen.numbers.size())
+    return unusable(why_inconsistent(seen, board), true);
   return fit_charuco(image, board, consistent);
 }
 
@@ -272,7 +285,7 @@ BoardView fit_grid(ImageView<const std::uint8_t> image, const Board& board, cons
     guess.pixel = {all.pixels[std::size_t(number)].x, all.pixels[std::size_t(number)].y};
     guess.margin = 1;
     const int across = board.columns - 1;
-    guess.upper_right_is_black = is_black(number % across + 1, number / across + 1);
+    guess.upper_right_is_black = board.is_black(number % across + 1, number / across + 1);
     const double radius_px = 0.25 * board.marker_mm / board.square_mm * (guess.right_px.norm() + guess.up_px.norm());
     const auto fit =
         board.type == BoardType::circles ? fit_disc(image, guess.pixel, radius_px) : fit_corner(image, guess);
@@ -312,7 +325,8 @@ BoardView detect_chessboard(ImageView<const std::uint8_t> image, const Board& bo
   const cv::Mat picture = matrix_of(image);
   std::vector<cv::Point2f> pixels;
   const cv::Size size(board.columns - 1, board.rows - 1);
-  if (!cv::findChessboardCornersSB(picture, size, pixels, cv::CALIB_CB_NORMALIZE_IMAGE))
+  if (!cv::findChessboardCornersSB(picture, size, pixels) &&
+      !cv::findChessboardCornersSB(picture, size, pixels, cv::CALIB_CB_EXHAUSTIVE))
     return unusable(fmt::format("no whole chessboard of {} x {} squares is seen", board.columns, board.rows));
   put_in_order(picture, board, pixels);
   return fit_grid(image, board, pixels);
@@ -326,8 +340,10 @@ BoardView detect_circles(ImageView<const std::uint8_t> image, const Board& board
   blobs.maxArea = 0.02f * float(image.width()) * float(image.height());
   blobs.minDistBetweenBlobs = 3;
   const auto detector = cv::SimpleBlobDetector::create(blobs);
-  if (!cv::findCirclesGrid(picture, cv::Size(board.columns, board.rows), pixels,
-                           cv::CALIB_CB_ASYMMETRIC_GRID | cv::CALIB_CB_CLUSTERING, detector))
+  const cv::Size size(board.columns, board.rows);
+  // Clustering bears tilts, the other way a cluttered surrounding.
+  if (!cv::findCirclesGrid(picture, size, pixels, cv::CALIB_CB_ASYMMETRIC_GRID | cv::CALIB_CB_CLUSTERING, detector) &&
+      !cv::findCirclesGrid(picture, size, pixels, cv::CALIB_CB_ASYMMETRIC_GRID, detector))
     return unusable(fmt::format("no whole grid of {} x {} circles is seen", board.columns, board.rows));
   // OpenCV's rows count downwards; the pattern is its own picture in a mirror along x.
   const auto across = static_cast<std::size_t>(board.columns);

@@ -51,11 +51,11 @@ cv::Ptr<aruco::Dictionary> dictionary_named(const std::string& name) {
   throw std::invalid_argument(fmt::format("no dictionary of markers is called '{}'; DICT_5X5_1000 is one", name));
 }
 
-std::vector<MarkerPlace> marker_places(int columns, int rows) {
+std::vector<MarkerPlace> marker_places(const Board& board) {
   std::vector<MarkerPlace> places;
-  for (int row = rows - 1; row >= 0; --row)
-    for (int column = 0; column < columns; ++column)
-      if ((row + column) % 2 != 0) places.push_back({column, row});
+  for (int row = board.rows - 1; row >= 0; --row)
+    for (int column = 0; column < board.columns; ++column)
+      if (!board.is_black(column, row)) places.push_back({column, row});
   return places;
 }
 

@@ -17,6 +17,6 @@ struct MarkerPlace {
   int column, row;  ///< of the square, from the lower left
 };
 /// The white squares of a board, in the order of their markers' numbers.
-std::vector<MarkerPlace> marker_places(int columns, int rows);
+std::vector<MarkerPlace> marker_places(const Board& board);
 
 }  // namespace pagesweep

@@ -19,8 +19,8 @@ void require_sound(const Board& board) {
 void draw_squares(const Board& board, BoardDrawing& drawing) {
   const double side = board.square_mm;
   for (int row = 0; row < board.rows; ++row)
-    for (int column = row % 2; column < board.columns; column += 2)
-      drawing.rectangles.push_back({column * side, row * side, side, side});
+    for (int column = 0; column < board.columns; ++column)
+      if (board.is_black(column, row)) drawing.rectangles.push_back({column * side, row * side, side, side});
 }
 
 /// A marker's black: its border, and runs of black cells.
@@ -43,7 +43,7 @@ void draw_marker(const cv::Mat& bits, double x_mm, double y_mm, double side_mm, 
 
 void draw_markers(const Board& board, BoardDrawing& drawing) {
   const auto dictionary = dictionary_named(board.dictionary);
-  const auto places = marker_places(board.columns, board.rows);
+  const auto places = marker_places(board);
   if (static_cast<std::size_t>(dictionary->bytesList.rows) < places.size())
     throw std::invalid_argument(fmt::format("the board needs {} markers, and {} has only {}", places.size(),
                                             board.dictionary, dictionary->bytesList.rows));

@@ -29,7 +29,7 @@ struct CornerFit {
 
 /// Maximum-likelihood position of a corner: two straight edges, blurred by a Gaussian, under light that varies
 /// linearly:
-///     I(x) = m + g . (x - c) +- a erf(l1(x) / (sqrt(2) s)) erf(l2(x) / (sqrt(2) s)),
+///     I(x) = (1 + g . (x - c)) (m +- a erf(l1(x) / (sqrt(2) s)) erf(l2(x) / (sqrt(2) s))),
 /// l1 and l2 being the signed distances to the edges through the corner c. Only samples near the edges count, so that a
 /// marker in a white square does no harm, and the edges are followed nearly half a square far.
 /// \return nothing if the picture has no such corner near the guess

@@ -101,12 +101,12 @@ Vector3<T> board_point(const Eigen::Vector2d& place, const Eigen::Vector2d& size
 
 /// Where a board's corner is seen. The middle of a circle's picture is not the picture of its middle: to second order
 /// it lies twice as far off it as the mean of four points of the rim does.
-template <class Projection, class T>
+template <class Projection, class T, class S>
 bool corner_pixel(const Projection& project, const Board& board, int corner, const T* inside, const T* pose,
-                  const T* rig_from_board, const T* shape, Vector2<T>& pixel) {
+                  const T* rig_from_board, const S* shape, Vector2<T>& pixel) {
   const Eigen::Vector2d place = board.corner_mm(corner), size = board.size_mm();
   const auto see = [&](const Eigen::Vector2d& at, Vector2<T>& image) {
-    const Vector3<T> on_board = board_point(at, size, shape);
+    const Vector3<T> on_board = board_point(at, size, shape).template cast<T>();
     Vector3<T> turned_point;
     ceres::AngleAxisRotatePoint(rig_from_board, on_board.data(), turned_point.data());
     const Vector3<T> in_rig = turned_point + Vector3<T>(rig_from_board[3], rig_from_board[4], rig_from_board[5]);

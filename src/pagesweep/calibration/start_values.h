@@ -2,13 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <vector>
 
-#include "pagesweep/base/enum_names.h"
 #include "pagesweep/camera/rigid3.h"
 #include "pagesweep/camera/scanner.h"
 
@@ -27,12 +24,6 @@ std::optional<double> find_focal_length(std::span<const Eigen::Matrix3d> picture
 
 /// Pose of a plane from its homography, picture coordinates being (u - cx, v - cy) / f.
 Rigid3 pose_from_homography(const Eigen::Matrix3d& image_from_plane);
-
-/// How a scanner maps space.
-enum class ScannerModel { brown_conrady, pushbroom, rotating_line };
-constexpr auto names_of(ScannerModel) {
-  return std::array<std::string_view, 3>{"brown-conrady", "pushbroom", "rotating-line"};
-}
 
 /// Points in the rig frame and where the scan shows them.
 struct ScanPoints {

@@ -39,6 +39,11 @@ Eigen::Vector2d Board::size_mm() const {
   return square_mm * squares.cwiseProduct(print_scale);
 }
 
+bool Board::is_black(int column, int row) const {
+  const int from = type == BoardType::charuco && !legacy_pattern ? rows - 1 : 0;  // a row that begins with black
+  return (column + row + from) % 2 == 0;
+}
+
 Eigen::Vector2d Board::middle_mm() const { return 0.5 * size_mm(); }
 
 std::string problem_of(const Board& board) {

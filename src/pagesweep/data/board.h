@@ -24,8 +24,9 @@ constexpr auto names_of(BoardType) { return std::array<std::string_view, 3>{"cha
 /// Board frame: x to the right and y up as printed, z out of the paper, right-handed; origin at the lower left corner
 /// of the lower left square (of the lower left circle's centre for circles); millimetres.
 ///
-/// Squares are counted from there: square (i, j) is black if i + j is even. Markers are numbered row by row from the
-/// top left, as OpenCV did until version 4.6.
+/// Squares are counted from there, and markers row by row from the upper left, as OpenCV does. With an even number of
+/// rows there are two kinds of ChArUco boards: with a white square at the upper left, as OpenCV made them before
+/// version 4.6, and with a black one, as it did from then on. With an odd number both are the same.
 struct Board {
   BoardType type = BoardType::charuco;
   std::string dictionary = "DICT_5X5_1000";  ///< of the markers, by OpenCV's name
@@ -33,6 +34,10 @@ struct Board {
   double square_mm = 7.5;  ///< side of a square as designed; for circles: distance of rows, half that within a row
   double marker_mm = 5.6;  ///< side of a marker as designed; for circles: their diameter
   Eigen::Vector2d print_scale = {1, 1};  ///< printed over designed length, along x and y
+  bool legacy_pattern = true;            ///< of ChArUco boards: the lower left square is black in any case
+
+  /// Whether square (column, row) is black.
+  bool is_black(int column, int row) const;
 
   /// Where squares meet, or circles: what is looked for in pictures.
   int corner_count() const;

@@ -39,6 +39,7 @@ Board read_board(const std::filesystem::path& file) {
   board.rows = squares[1].integer(2, most_squares);
   board.square_mm = json.at("square_mm").number();
   if (board.type == BoardType::charuco) board.dictionary = json.at("dictionary").text();
+  if (const auto legacy = json.find("legacy_pattern")) board.legacy_pattern = legacy->boolean();
   if (board.type != BoardType::chessboard) board.marker_mm = json.at("marker_mm").number();
   if (const auto scale = json.find("print_scale")) {
     const auto pair = read_pair(*scale);
@@ -54,7 +55,10 @@ void write_board(const std::filesystem::path& file, const Board& board) {
                                  {"type", std::string(name_of(board.type))},
                                  {"squares", {board.columns, board.rows}},
                                  {"square_mm", board.square_mm}};
-  if (board.type == BoardType::charuco) json["dictionary"] = board.dictionary;
+  if (board.type == BoardType::charuco) {
+    json["dictionary"] = board.dictionary;
+    json["legacy_pattern"] = board.legacy_pattern;
+  }
   if (board.type != BoardType::chessboard) json["marker_mm"] = board.marker_mm;
   json["print_scale"] = {board.print_scale.x(), board.print_scale.y()};
   write_json(file, json);

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <random>
 
+#include "pagesweep/io/board_file.h"
 #include "pagesweep/io/capture_file.h"
 #include "pagesweep/io/colmap_rig.h"
 #include "pagesweep/io/files_testing.h"
@@ -154,6 +155,7 @@ std::vector<Format> all_formats() {
   };
   std::vector<Format> formats = {
       {"rig.json", [](const Path& file) { write_rig(file, some_rig()); }, [](const Path& file) { read_rig(file); }},
+      {"board.json", [](const Path& file) { write_board(file, {}); }, [](const Path& file) { read_board(file); }},
       {"capture.json", write_capture_to, [](const Path& file) { read_capture(file); }},
       {"truth.json", write_truth_to, [](const Path& file) { read_truth(file); }},
       {"points.ply", write_ply_to, [](const Path& file) { read_ply(file); }},
