@@ -119,7 +119,9 @@ a percent: measure both rulers and run the command again with --measured-mm.
   add_common_options(*command, arguments->common);
   command->footer(R"(Examples:
   pagesweep board --paper A3 --square-mm 14 --marker-mm 10.5 -o board.json
-  pagesweep board --squares 25x18 --square-mm 7.5 --marker-mm 5.6 --paper A4 --measured-mm 179.6,129.9 -o board.json
+  pagesweep board --squares 25x18 --square-mm 7.5 --marker-mm 5.6 --paper A4 -o board.json
+  pagesweep board --squares 25x18 --square-mm 7.5 --marker-mm 5.6 --paper A4 \
+                  --measured-mm 179.6,129.9 -o board.json
   pagesweep board --type chessboard --squares 12x9 --square-mm 20 -o chessboard.json
 )");
   command->callback([arguments] { run(*arguments); });

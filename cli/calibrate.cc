@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 
@@ -36,7 +37,12 @@ struct Arguments {
 CalibrationInput read_pictures(const Arguments& arguments, Progress& progress) {
   const Board board = read_board(arguments.board);
   std::vector<PictureList> cameras;
-  for (const std::string& text : arguments.cameras) cameras.push_back(list_pictures(text, ""));
+  for (const std::string& text : arguments.cameras) {
+    cameras.push_back(list_pictures(text, ""));
+    const std::string& name = cameras.back().sensor;
+    if (name == "scanner" || std::ranges::count(cameras, name, &PictureList::sensor) > 1)
+      throw std::invalid_argument(fmt::format("--camera: another camera, or the scanner, is called '{}'", name));
+  }
   std::optional<PictureList> scanner;
   if (!arguments.scanner.empty()) scanner = list_pictures(arguments.scanner, "scanner");
   return find_boards(board, cameras, scanner ? &*scanner : nullptr, arguments.detection, progress);
@@ -106,7 +112,8 @@ report says how good the rig is, and which pictures would make it better:
   arguments->detection.describe(OptionVisitor(*command, "Finding the board"));
   add_common_options(*command, arguments->common);
   command->footer(R"(Examples:
-  pagesweep calibrate --board board.json --camera 'cam1=left/*.png' --camera 'cam2=right/*.png' -o rig.json
+  pagesweep calibrate --board board.json --camera 'cam1=left/*.png' --camera 'cam2=right/*.png' \
+                      -o rig.json
   pagesweep calibrate --board board.json --camera 'cam1=cam1/*.png' --camera 'cam2=cam2/*.png' \
                       --scanner 'scans/*.tif' --cross-validate -o rig.json
 )");

@@ -126,7 +126,7 @@ TEST(DetectBoard, AWrongDefinitionIsNamed) {
 TEST(DetectBoard, NoisePicturesHarmNobody) {
   std::mt19937 random(3);
   for (const BoardType type : {BoardType::charuco, BoardType::chessboard, BoardType::circles}) {
-    Image<std::uint8_t> noise(200, 160);
+    Image<std::uint8_t> noise(100, 80);
     for (std::uint8_t& pixel : noise.pixels()) pixel = static_cast<std::uint8_t>(random());
     EXPECT_NE(detect_board(noise.view(), some_board(type)).problem, "") << name_of(type);
   }

@@ -36,8 +36,8 @@ void ink_disc(const BoardDrawing::Disc& disc, double border, double texels_per_m
 }
 
 /// The board with its white border: texel rows count along the board's y axis. A texel has its ink's exact share.
-Image<float> print_texels(const BoardDrawing& drawing, const BoardRenderOptions& options) {
-  const double scale = options.texels_per_mm, border = options.border_mm;
+Image<float> print_texels(const BoardDrawing& drawing, double border, const BoardRenderOptions& options) {
+  const double scale = options.texels_per_mm;
   Image<float> ink(static_cast<int>(std::ceil((drawing.width_mm + 2 * border) * scale)),
                    static_cast<int>(std::ceil((drawing.height_mm + 2 * border) * scale)));
   for (const auto& r : drawing.rectangles)
@@ -67,11 +67,13 @@ GridMesh make_board_mesh(const PlacedBoard& board, double border_mm) {
 }
 
 World build_world(const PlacedBoard& board, const BoardRenderOptions& options) {
+  double border_mm = options.border_mm;
+  for (const auto& disc : board.drawing->discs) border_mm = std::max(border_mm, options.border_mm + disc.radius_mm);
   World world;
   world.surfaces.push_back({.mesh = make_rectangle({-600, -600, -0.2}, 1200, 1200, 100),
                             .albedo = Texture(static_cast<float>(options.table))});
-  world.surfaces.push_back({.mesh = make_board_mesh(board, options.border_mm),
-                            .albedo = Texture(print_texels(*board.drawing, options), options.texels_per_mm),
+  world.surfaces.push_back({.mesh = make_board_mesh(board, border_mm),
+                            .albedo = Texture(print_texels(*board.drawing, border_mm, options), options.texels_per_mm),
                             .is_measured = true});
   return world;
 }
