@@ -8,6 +8,7 @@
 
 #include "pagesweep/camera/rigid3.h"
 #include "pagesweep/camera/scanner.h"
+#include "pagesweep/camera/scanner_model.h"
 
 namespace pagesweep {
 

@@ -2,12 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <optional>
-#include <string_view>
 #include <variant>
 
-#include "pagesweep/base/enum_names.h"
 #include "pagesweep/camera/camera.h"
 
 namespace pagesweep {
@@ -34,12 +31,6 @@ struct RotatingLine {
   double angle0 = 0;                                 ///< [rad]
   double angle_step = 0;                             ///< [rad] a row
 };
-
-/// How a scanner maps space.
-enum class ScannerModel { brown_conrady, pushbroom, rotating_line };
-constexpr auto names_of(ScannerModel) {
-  return std::array<std::string_view, 3>{"brown-conrady", "pushbroom", "rotating-line"};
-}
 
 /// The scanner's own picture of the rig frame: the function G of the paper (eq. 12), in one of three models. A frame
 /// camera stands also for a line sensor that travels behind a fixed lens.

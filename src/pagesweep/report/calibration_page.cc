@@ -162,20 +162,17 @@ std::string format_map(const Image<float>& map, const std::string& unit, const s
 }
 
 std::string format_accuracy(const CalibrationReport& report, const PictureEncoder& encoder) {
-  std::string html;
+  std::string points, scan;
   for (const AccuracyMap& map : report.accuracy) {
     if (map.point_mm.empty()) continue;
+    const std::string height = fmt::format("{:.0f} mm above the table.", map.height_mm);
     const std::string where = fmt::format("x from {:.0f} mm to the right, y from {:.0f} mm upwards, {:.0f} mm a cell.",
                                           map.low_mm.x(), map.low_mm.y(), map.spacing_mm);
-    std::string figures = format_map(map.point_mm, "mm",
-                                     fmt::format("Points, {:.0f} mm above the table.", map.height_mm), where, encoder);
+    points += format_map(map.point_mm, "mm", "Points, " + height, where, encoder);
     if (!map.scan_px.empty())
-      figures +=
-          format_map(map.scan_px, "px", fmt::format("Places in the scan, {:.0f} mm above the table.", map.height_mm),
-                     "Of a triangulated point.", encoder);
-    html += format_row("two", figures);
+      scan += format_map(map.scan_px, "px", "Places in the scan, " + height, "Of a triangulated point.", encoder);
   }
-  return html;
+  return format_row("three", points) + format_row("three", scan);
 }
 
 // ---- tables ----

@@ -8,6 +8,7 @@
 #include "pagesweep/base/enum_names.h"
 #include "pagesweep/base/progress.h"
 #include "pagesweep/camera/rig.h"
+#include "pagesweep/camera/scanner_model.h"
 #include "pagesweep/data/board.h"
 #include "pagesweep/sim/render_board.h"
 
