@@ -29,23 +29,6 @@ std::vector<fs::path> files_like(const std::string& pattern) {
   return files;
 }
 
-/// Gray values of 8 bit, the highest that the picture's depth allows being 255. Of colours green, the sharpest.
-Image<std::uint8_t> gray_of(const Picture& picture) {
-  Image<std::uint8_t> gray(picture.width(), picture.height());
-  const int channel = picture.channels == 3 ? 1 : 0;
-  const auto convert = [&](const auto& samples) {
-    unsigned most = 255;
-    if (picture.bit_depth() == 16)  // 10 and 12 bit cameras use the lower bits only
-      for (const auto sample : samples.pixels()) most = std::max(most, unsigned(sample));
-    const int shift = std::bit_width(most) - 8;
-    for (int y = 0; y < gray.height(); ++y)
-      for (int x = 0; x < gray.width(); ++x)
-        gray(x, y) = static_cast<std::uint8_t>(samples(x * picture.channels + channel, y) >> shift);
-  };
-  std::visit(convert, picture.samples);
-  return gray;
-}
-
 /// The pose that each picture shows, by name or by place in the list.
 std::vector<std::string> name_poses(const std::vector<const PictureList*>& lists,
                                     std::vector<std::vector<std::string>>& names_of_lists) {
@@ -89,6 +72,22 @@ SensorPictures search(const PictureList& list, const std::vector<std::string>& n
 }
 
 }  // namespace
+
+Image<std::uint8_t> gray_of(const Picture& picture) {
+  Image<std::uint8_t> gray(picture.width(), picture.height());
+  const int channel = picture.channels == 3 ? 1 : 0;
+  const auto convert = [&](const auto& samples) {
+    unsigned most = 255;
+    if (picture.bit_depth() == 16)  // 10 and 12 bit cameras use the lower bits only
+      for (const auto sample : samples.pixels()) most = std::max(most, unsigned(sample));
+    const int shift = std::bit_width(most) - 8;
+    for (int y = 0; y < gray.height(); ++y)
+      for (int x = 0; x < gray.width(); ++x)
+        gray(x, y) = static_cast<std::uint8_t>(samples(x * picture.channels + channel, y) >> shift);
+  };
+  std::visit(convert, picture.samples);
+  return gray;
+}
 
 PictureList list_pictures(const std::string& text, const std::string& sensor) {
   const auto equals = text.find('=');

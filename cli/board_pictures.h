@@ -7,6 +7,7 @@
 
 #include "pagesweep/base/progress.h"
 #include "pagesweep/calibration/calibrate.h"
+#include "pagesweep/data/picture.h"
 
 namespace pagesweep::cli {
 
@@ -21,6 +22,9 @@ struct PictureList {
 /// \throws std::invalid_argument  if the text is of another kind
 /// \throws Error                  if no file matches
 PictureList list_pictures(const std::string& text, const std::string& sensor);
+
+/// Gray values of 8 bit, the highest that the picture's depth allows being 255. Of colours green, the sharpest.
+Image<std::uint8_t> gray_of(const Picture& picture);
 
 /// Searches all pictures for the board. Pictures of different sensors show the same pose if they have the same name up
 /// to its last dot; where no two names are the same but there are as many of each, the first belongs to the first.

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/board_pictures.h"
+#include "cli/board_sweeps.h"
 #include "cli/command.h"
 #include "cli/console_progress.h"
 #include "cli/option_visitor.h"
@@ -30,6 +31,7 @@ struct Arguments {
   std::filesystem::path report;  ///< empty: beside the rig
   std::vector<std::string> cameras;
   std::string scanner;
+  std::vector<std::filesystem::path> sweeps;
   DetectionOptions detection;
   CalibrationOptions calibration;
 };
@@ -54,12 +56,34 @@ std::filesystem::path report_folder(const Arguments& arguments) {
   return arguments.output.parent_path() / (arguments.output.stem().string() + "-report");
 }
 
+/// What sweeps tell beside the corners: light and sensors.
+std::string learn_from_sweeps(const CalibrationInput& input, const std::vector<WatchedSweep>& sweeps,
+                              Calibration& calibration) {
+  if (sweeps.empty()) return {};
+  const LightFit light = light_of(sweeps, calibration);
+  calibration.rig.light = light.light;
+  describe_sensors(input, sweeps, calibration.rig);
+  std::string text = fmt::format("Light: a plane that {}, {:.3f} mm rms at {} places\n",
+                                 light.turns ? "turns evenly" : "moves evenly", light.rms_mm, light.used);
+  if (light.tilt_sigma > 0.02)
+    text += "  Its tilt is not known well: let it sweep over the board once more, lifted or tilted.\n";
+  for (const Camera& camera : calibration.rig.cameras)
+    if (camera.sensor)
+      text += fmt::format("{}: {:.3f} gray values an electron, read noise {:.2f} gray values, blur {:.2f} px\n",
+                          camera.name, camera.sensor->gain, camera.sensor->read_noise, camera.sensor->psf_sigma_px);
+  return text;
+}
+
 void run(const Arguments& arguments) {
+  if (arguments.cameras.empty() && arguments.sweeps.empty())
+    throw std::invalid_argument("--camera or --sweep: there is nothing to calibrate from");
   const ThreadLimit limit(arguments.common.threads);
   ConsoleProgress progress(arguments.common.quiet);
   OutputFolder output(report_folder(arguments), "report.json");
-  const CalibrationInput input = read_pictures(arguments, progress);
-  const Calibration calibration = calibrate(input, arguments.calibration, progress);
+  CalibrationInput input = read_pictures(arguments, progress);
+  const auto sweeps = add_sweeps(arguments.sweeps, arguments.detection, input, progress);
+  Calibration calibration = calibrate(input, arguments.calibration, progress);
+  const std::string learned = learn_from_sweeps(input, sweeps, calibration);
   progress.begin("predicting the accuracy");
   CalibrationReport report = judge_calibration(input, calibration, predict_accuracy(calibration, heights_mm));
   report.title = arguments.output.string();
@@ -71,8 +95,9 @@ void run(const Arguments& arguments) {
   write_rig(arguments.output, calibration.rig);
   output.finish();
   progress.finish();
-  print_answer(arguments.common, nlohmann::ordered_json::parse(format_calibration_json(report)),
-               format_calibration_text(report) + "Report: " + (output.path() / "report.html").string() + "\n");
+  print_answer(
+      arguments.common, nlohmann::ordered_json::parse(format_calibration_json(report)),
+      format_calibration_text(report) + learned + "Report: " + (output.path() / "report.html").string() + "\n");
 }
 
 void add_inputs(CLI::App& command, Arguments& arguments) {
@@ -84,10 +109,15 @@ void add_inputs(CLI::App& command, Arguments& arguments) {
           "--camera", arguments.cameras,
           "a camera's name and its pictures, in quotes; once for each camera. Pictures with the same name belong "
           "together")
-      ->required()
       ->option_text("<name>=<files>");
   command.add_option("--scanner", arguments.scanner, "the scanner's pictures of the same poses, in quotes")
       ->option_text("<files>");
+  command
+      .add_option(
+          "--sweep", arguments.sweeps,
+          "a capture of the light's sweep over the board; it gives pictures of all sensors, the light's motion, "
+          "noise and blur")
+      ->option_text("<capture> ...");
   command.add_option("-o,--output", arguments.output, "the rig to write")->required()->option_text("<file>");
   command.add_option("--report", arguments.report, "where the report goes; else into a folder beside the rig")
       ->option_text("<folder>");
@@ -116,6 +146,7 @@ report says how good the rig is, and which pictures would make it better:
                       -o rig.json
   pagesweep calibrate --board board.json --camera 'cam1=cam1/*.png' --camera 'cam2=cam2/*.png' \
                       --scanner 'scans/*.tif' --cross-validate -o rig.json
+  pagesweep calibrate --board board.json --sweep sweeps/* -o rig.json
 )");
   command->callback([arguments] { run(*arguments); });
 }

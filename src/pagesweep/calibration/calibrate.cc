@@ -103,13 +103,28 @@ Eigen::Vector3d nearest_axis(const Rigid3& rig_from_board, const Eigen::Vector3d
 
 namespace {
 
+/// The direction in which the light moves over the table, in the present frame: mean over the boards that saw it; zero
+/// if none did.
+Eigen::Vector3d light_direction(const CalibrationInput& input, const Bundle& bundle, const Eigen::Vector3d& up) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& [pose, on_board] : input.light_directions) {
+    const bool is_known = std::ranges::any_of(
+        bundle.observations, [pose](const Observation& seen) { return seen.pose == pose && seen.used; });
+    if (is_known) sum += bundle.rig_from_board[std::size_t(pose)].rotation.leftCols<2>() * on_board;
+  }
+  const Eigen::Vector3d level = sum - up.dot(sum) * up;
+  return level.norm() > 0 ? Eigen::Vector3d(level.normalized()) : level;
+}
+
 /// From the frame of the adjustment to the rig frame that calibrate() promises.
-Rigid3 table_from_present(const Bundle& bundle, int table_pose, double board_thickness_mm) {
+Rigid3 table_from_present(const CalibrationInput& input, const Bundle& bundle, int table_pose,
+                          double board_thickness_mm) {
   const Rigid3& present_from_board = bundle.rig_from_board[std::size_t(table_pose)];
   const Eigen::Vector2d middle = bundle.board.middle_mm();
   const Eigen::Vector3d up = present_from_board.rotation.col(2);
   const Eigen::Vector3d print = present_from_board * Eigen::Vector3d(middle.x(), middle.y(), 0);
-  const Eigen::Vector3d y = sweep_direction(bundle, present_from_board, print);
+  const Eigen::Vector3d seen = light_direction(input, bundle, up);
+  const Eigen::Vector3d y = seen.norm() > 0 ? seen : sweep_direction(bundle, present_from_board, print);
   Rigid3 present_from_table;
   present_from_table.rotation.col(0) = y.cross(up);
   present_from_table.rotation.col(1) = y;
@@ -133,8 +148,9 @@ int find_table_pose(const CalibrationInput& input, const Bundle& bundle, const s
 
 /// Puts everything into the rig frame and adjusts once more there, so that covariances refer to it: the table's pose is
 /// what the frame is made of, so it is held.
-BundleSolution settle_in_rig_frame(Bundle& bundle, int table_pose, const CalibrationOptions& options) {
-  move(bundle, table_from_present(bundle, table_pose, options.board_thickness_mm));
+BundleSolution settle_in_rig_frame(const CalibrationInput& input, Bundle& bundle, int table_pose,
+                                   const CalibrationOptions& options) {
+  move(bundle, table_from_present(input, bundle, table_pose, options.board_thickness_mm));
   for (Sensor& sensor : bundle.sensors) sensor.pose_is_held = false;
   bundle.pose_is_held[std::size_t(table_pose)] = true;
   BundleOptions last{options.lens, options.fit_stretch, options.fit_bend, 0, true};
@@ -205,7 +221,7 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
     adjust(result.bundle, options);
   }
   result.table_pose = find_table_pose(input, result.bundle, options.table_pose);
-  result.solution = settle_in_rig_frame(result.bundle, result.table_pose, options);
+  result.solution = settle_in_rig_frame(input, result.bundle, result.table_pose, options);
   if (!result.solution.problem.empty())
     throw no_result(result.solution.problem + ": show the board tilted, turned and at other heights");
   if (options.cross_validate) {

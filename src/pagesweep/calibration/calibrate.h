@@ -65,6 +65,12 @@ struct CalibrationInput {
   Board board;
   std::vector<std::string> poses;  ///< names
   std::vector<SensorPictures> sensors;
+  /// In which direction over the board the light moves, of poses in which that was seen.
+  struct LightDirection {
+    int pose = 0;
+    Eigen::Vector2d on_board;  ///< unit length, board frame
+  };
+  std::vector<LightDirection> light_directions = {};
 };
 
 /// How well one model of the scanner predicts pictures that it was not fitted to.
@@ -89,7 +95,8 @@ struct Calibration {
 /// then one least-squares adjustment of everything.
 ///
 /// Rig frame: z = 0 is the table and z points to the cameras; the origin is below the middle of the board in the table
-/// pose. With a scanner y is the direction in which its rows count; without, the axis of the board that comes closest
+/// pose. y is the direction in which the light moves, if that is known; else with a scanner the direction in which its
+/// rows count; without, the axis of the board that comes closest
 /// to the line from the first camera to the second one; with one camera, the one closest to its rows, downwards.
 ///
 /// \throws Error                  if the pictures cannot give a calibration; the message names the cause

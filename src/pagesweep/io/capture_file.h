@@ -55,6 +55,11 @@ void write_capture(const Capture& capture);
 /// The rig that a capture names.
 Rig read_capture_rig(const Capture& capture);
 
+/// Cameras of which only names and sizes are known, from the frames themselves: enough to open a capture that has no rig
+/// yet.
+/// \throws Error  if the frames cannot be read
+Rig read_camera_sizes(const Capture& capture);
+
 /// What Frames and the stations need to know of a sequence that `camera` recorded.
 Sequence make_sequence(const SequenceFiles& files, const Camera& camera);
 

@@ -219,6 +219,25 @@ Sequence make_sequence(const SequenceFiles& files, const Camera& camera) {
           files.bit_depth, files.black_level, files.saturation, relative_exposures(files.exposure_ms, files.count)};
 }
 
+Rig read_camera_sizes(const Capture& capture) {
+  Rig rig;
+  for (const SequenceFiles& files : capture.sequences) {
+    Camera camera;
+    camera.name = files.camera;
+    if (!files.recording.empty()) {
+      const ImageSize size = RecordingReader(capture.folder / files.recording).size();
+      camera.width = size.width, camera.height = size.height;
+    } else {
+      int i = 0;
+      while (i + 1 < files.count && !std::filesystem::exists(capture.frame_path(files, i))) ++i;
+      const GrayImage first = read_gray(capture.frame_path(files, i));
+      camera.width = width_of(first), camera.height = height_of(first);
+    }
+    rig.cameras.push_back(std::move(camera));
+  }
+  return rig;
+}
+
 std::unique_ptr<FrameSource> open_capture(const Capture& capture, const Rig& rig) {
   return std::make_unique<CaptureSource>(capture, rig);
 }
