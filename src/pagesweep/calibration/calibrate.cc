@@ -103,17 +103,21 @@ Eigen::Vector3d nearest_axis(const Rigid3& rig_from_board, const Eigen::Vector3d
 
 namespace {
 
-/// The direction in which the light moves over the table, in the present frame: mean over the boards that saw it; zero
-/// if none did.
+/// The direction in which the light moves over the table, in the present frame, from the flattest board that saw it;
+/// zero if none did. On a tilted board the light's line lies otherwise than on the table.
 Eigen::Vector3d light_direction(const CalibrationInput& input, const Bundle& bundle, const Eigen::Vector3d& up) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  double flattest = 0;
   for (const auto& [pose, on_board] : input.light_directions) {
-    const bool is_known = std::ranges::any_of(
-        bundle.observations, [pose](const Observation& seen) { return seen.pose == pose && seen.used; });
-    if (is_known) sum += bundle.rig_from_board[std::size_t(pose)].rotation.leftCols<2>() * on_board;
+    const auto is_of_it = [pose = pose](const Observation& seen) { return seen.pose == pose && seen.used; };
+    const Eigen::Matrix3d& axes = bundle.rig_from_board[std::size_t(pose)].rotation;
+    const double flatness = axes.col(2).dot(up);
+    if (!(flatness > flattest) || !std::ranges::any_of(bundle.observations, is_of_it)) continue;
+    flattest = flatness;
+    const Eigen::Vector3d along = axes.leftCols<2>() * on_board;
+    direction = (along - up.dot(along) * up).normalized();
   }
-  const Eigen::Vector3d level = sum - up.dot(sum) * up;
-  return level.norm() > 0 ? Eigen::Vector3d(level.normalized()) : level;
+  return direction;
 }
 
 /// From the frame of the adjustment to the rig frame that calibrate() promises.

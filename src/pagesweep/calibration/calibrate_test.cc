@@ -79,6 +79,18 @@ TEST(Calibrate, TheRigFrameIsTheTableWithTheSweepAlongY) {
   EXPECT_EQ(third.table_pose, 2);
 }
 
+TEST(Calibrate, TheRigsYIsTheWayTheLightGoes) {
+  SimulatedCorners corners{.rig = simulated_rig()};
+  corners.noise_px = 1e-4;
+  CalibrationInput input = corners.input(3);
+  // Over the first board, which lies flat, the light goes along -x and a little y of the board; a tilted one has less say.
+  const Eigen::Vector2d way = Eigen::Vector2d(-1, 0.1).normalized();
+  input.light_directions = {{4, Eigen::Vector2d(0, 1)}, {0, way}};
+  const Calibration calibration = calibrate(input, {});
+  const Eigen::Vector3d seen = calibration.bundle.rig_from_board[0].rotation.leftCols<2>() * way;
+  EXPECT_NEAR((seen - Eigen::Vector3d::UnitY()).norm(), 0, 1e-6);
+}
+
 /// The last step of a calibration, from the truth as start values: the frame is the true pose of the first board.
 Calibration adjust_in_true_frame(const SimulatedCorners& corners, unsigned seed) {
   const CalibrationInput input = corners.input(seed);

@@ -79,6 +79,20 @@ TEST(CaptureFile, KeepsWhatWasWritten) {
   }
 }
 
+TEST(CaptureFile, TellsTheCamerasSizesWithoutARig) {
+  const TestFolder folder;
+  const Capture capture = make_capture(folder);
+  std::filesystem::remove(folder / "rig.json");
+  std::filesystem::remove(capture.frame_path(capture.sequences[0], 0));  // a dropped frame tells nothing
+  const Rig sizes = read_camera_sizes(capture);
+  ASSERT_EQ(sizes.cameras.size(), 2u);
+  EXPECT_EQ(sizes.cameras[1].name, "cam2");
+  EXPECT_EQ(sizes.cameras[0].width, side);
+  EXPECT_EQ(sizes.cameras[0].height, side);
+  const auto frames = read_all(*open_capture(capture, sizes));
+  EXPECT_EQ(frames[0].dropped(), 1);
+}
+
 TEST(CaptureFile, YieldsAllFramesInOrderWhateverTheThreads) {
   const TestFolder folder;
   const Capture capture = make_capture(folder);
