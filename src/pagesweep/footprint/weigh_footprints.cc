@@ -13,36 +13,13 @@
 
 #include "pagesweep/base/local_plane.h"
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/data/linear_light.h"
 #include "pagesweep/footprint/spot_sums_internal.h"
 
 namespace pagesweep {
 namespace {
 
 constexpr float negligible_px = 0.02f;  ///< an offset that no time value would notice
-
-/// Light of an sRGB sample between 0 and 1 (IEC 61966-2-1).
-float light_of(double sample) {
-  return static_cast<float>(sample <= 0.04045 ? sample / 12.92 : std::pow((sample + 0.055) / 1.055, 2.4));
-}
-
-/// The scan as light: mean of its channels.
-Image<float> light_of(const Picture& scan) {
-  Image<float> light(scan.width(), scan.height());
-  std::visit(
-      [&](const auto& samples) {
-        const int highest = std::numeric_limits<std::decay_t<decltype(samples(0, 0))>>::max();
-        std::vector<float> table(static_cast<std::size_t>(highest) + 1);
-        for (int i = 0; i <= highest; ++i)
-          table[static_cast<std::size_t>(i)] =
-              light_of(static_cast<double>(i) / highest) / static_cast<float>(scan.channels);
-        parallel_rows(scan.height(), [&](int y) {
-          for (int x = 0; x < scan.width(); ++x)
-            for (int c = 0; c < scan.channels; ++c) light(x, y) += table[samples(x * scan.channels + c, y)];
-        });
-      },
-      scan.samples);
-  return light;
-}
 
 /// Where the scanner sees the points [px].
 struct ScanPositions {
@@ -180,7 +157,7 @@ SpotOffsets weigh_footprints(const PointMap& points, const Scanner& scanner, con
   if (scan.width() != scanner.width() || scan.height() != scanner.height())
     throw std::invalid_argument("weigh_footprints: the picture is not of the scanner's size");
   if (!(spot_variance_px2 > 0)) throw std::invalid_argument("weigh_footprints: the spot's variance must be above 0");
-  const Image<float> light = light_of(scan);
+  const Image<float> light = linear_light(scan);
   const ScanPositions positions = project(points, scanner);
   const auto sigma_px = static_cast<float>(std::sqrt(spot_variance_px2));
   const float usual_px = 3 * sigma_px * typical_step(positions);
