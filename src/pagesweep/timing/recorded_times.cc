@@ -11,8 +11,6 @@
 namespace pagesweep {
 namespace {
 
-static_assert(width_tile_px == StripeRecorder::tile_px, "a tile is a tile");
-
 /// Calls body(begin, end) for ranges of tiles, on all threads.
 template <class Body>
 void for_tiles(std::size_t count, const Body& body) {

@@ -19,8 +19,6 @@ constexpr int most_apart = 32;        // [frames] between the bells of pixels th
 /// Half a sigma less than a bell needs to be told from noise: between two blocks the response is that much lower.
 constexpr float least_significance = 3;
 
-int tiles_over(int pixels) { return (pixels + StripeRecorder::tile_px - 1) / StripeRecorder::tile_px; }
-
 /// Counts the frames begin, begin + 1, ... before `end` in which each pixel of row y is clipped.
 template <class T>
 void count_clipped(const Frames& frames, int begin, int end, int y, std::span<std::uint8_t> counts) {
@@ -53,7 +51,7 @@ StripeRecorder::StripeRecorder(const Sequence& sequence, double fwhm, int half, 
     : search_(sequence.width, sequence.height, fwhm, read_variance),
       windows_(sequence, half),
       recorded_place_(sequence.width, sequence.height, -1),
-      tiles_(tiles_over(sequence.width), tiles_over(sequence.height)),
+      tiles_(width_tiles(sequence.width), width_tiles(sequence.height)),
       clipped_(sequence.width, sequence.height) {}
 
 int StripeRecorder::last_ready(int end) const {

@@ -7,6 +7,7 @@
 #include "pagesweep/base/image.h"
 #include "pagesweep/timing/coarse_search_internal.h"
 #include "pagesweep/timing/stripe_windows_internal.h"
+#include "pagesweep/timing/width_tiles_internal.h"
 
 namespace pagesweep {
 
@@ -15,7 +16,7 @@ namespace pagesweep {
 class StripeRecorder {
  public:
   /// Windows change tile by tile.
-  static constexpr int tile_px = 32;
+  static constexpr int tile_px = width_tile_px;
 
   /// Whether the frames can be recorded that way: they must be of one exposure.
   static bool can_record(const Sequence& sequence);
