@@ -209,6 +209,7 @@ PageErrors compare_pages(const MappedPage& result, const MappedPage& truth, cons
     }
   errors.displacement = summarise(std::move(sizes));
   errors.rotation_rad = -alignment.angle_rad;
+  errors.shift_mm = alignment.shift;
   measure_scale(spots, weights, alignment, errors);
   judge_lines(finder, alignment, options, errors);
   return errors;

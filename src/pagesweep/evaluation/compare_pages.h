@@ -33,10 +33,11 @@ struct MappedPage {
 struct PageErrors {
   ErrorSummary displacement;                 ///< [mm] length of the displacement of each page position (never negative)
   double rotation_rad = ErrorSummary::none;  ///< by which the page stands askew, clockwise
-  double scale_error = ErrorSummary::none;   ///< size of the page over its true size, minus 1
-  double scale_error_x = ErrorSummary::none;  ///< the same along the text lines
-  double scale_error_y = ErrorSummary::none;  ///< and across them
-  double covered = 0;                         ///< share of the true page's positions that are on the result
+  Eigen::Vector2d shift_mm = Eigen::Vector2d::Zero();  ///< then: truth = result turned by -rotation_rad + shift_mm
+  double scale_error = ErrorSummary::none;             ///< size of the page over its true size, minus 1
+  double scale_error_x = ErrorSummary::none;           ///< the same along the text lines
+  double scale_error_y = ErrorSummary::none;           ///< and across them
+  double covered = 0;                                  ///< share of the true page's positions that are on the result
 
   ErrorSummary line_deviation;  ///< [mm] of the places on text lines from the straight line through their text line
   double line_deviation_in_window = ErrorSummary::none;  ///< [mm] largest deviation within any window of a text line

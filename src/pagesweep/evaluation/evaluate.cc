@@ -8,6 +8,7 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/evaluation/time_bound.h"
+#include "pagesweep/io/atomic_file.h"
 #include "pagesweep/io/capture_file.h"
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
@@ -15,6 +16,7 @@
 #include "pagesweep/io/result_files.h"
 #include "pagesweep/io/rig_file.h"
 #include "pagesweep/io/truth_file.h"
+#include "pagesweep/ocr/recognise_text.h"
 
 namespace pagesweep {
 namespace {
@@ -154,17 +156,43 @@ void evaluate_kinds(const Truth& truth, const std::vector<CameraData>& cameras, 
   if (!views.empty()) evaluation.kinds = compare_kinds(views, find_gutter(truth), options.times, bound);
 }
 
-/// The resolution that the page's picture states; 0 if it states none.
-double page_scale(const PageFiles& files) {
+/// The page's picture, whatever its format; one without samples if there is none.
+Picture read_result(const PageFiles& files) {
   const auto pictures = files.pictures();
-  return pictures.empty() ? 0 : read_picture(pictures.front()).pixels_per_mm;
+  return pictures.empty() ? Picture{} : read_picture(pictures.front());
+}
+
+void evaluate_text(const Picture& result, const Picture& printed, const Truth& truth, const TruthPage& page,
+                   const TextRecogniser& read_text, PageEvaluation& evaluation) {
+  constexpr std::size_t most_bytes = 16 << 20;
+  if (page.text.empty()) {
+    evaluation.text_reason = "the truth does not tell the printed text";
+    return;
+  }
+  const std::string text = read_bytes(truth.folder / page.text, most_bytes);
+  evaluation.text = TextEvaluation{compare_text(text, plain_text(read_text(result))),
+                                   compare_text(text, plain_text(read_text(printed)))};
+}
+
+void evaluate_look(const Picture& result, const Truth& truth, const TruthPage& page,
+                   const std::optional<TextRecogniser>& read_text, PageEvaluation& evaluation) {
+  if (!fs::exists(truth.page_path(page.index))) {
+    evaluation.text_reason = "the truth has no picture of this page";
+    return;
+  }
+  Picture printed = read_picture(truth.page_path(page.index));
+  printed.pixels_per_mm = page.pixels_per_mm;
+  evaluation.picture = compare_pictures(result, printed, *evaluation.errors);
+  evaluation.text_reason = "no language was given";
+  if (read_text) evaluate_text(result, printed, truth, page, *read_text, evaluation);
 }
 
 PageEvaluation evaluate_page(const fs::path& out, const Truth& truth, const TruthPage& page,
-                             const EvaluationOptions& options) {
-  PageEvaluation evaluation{page.index, {}, {}};
+                             const std::optional<TextRecogniser>& read_text, const EvaluationOptions& options) {
+  PageEvaluation evaluation{page.index, {}, {}, {}, {}, "this page could not be compared"};
   const PageFiles files(out, page.index);
-  const double pixels_per_mm = page_scale(files);
+  const Picture picture = read_result(files);
+  const double pixels_per_mm = picture.pixels_per_mm;
   if (!fs::exists(files.scan_map)) {
     evaluation.reason = "the result does not have this page";
   } else if (!(pixels_per_mm > 0)) {
@@ -178,6 +206,8 @@ PageEvaluation evaluate_page(const fs::path& out, const Truth& truth, const Trut
     if (evaluation.errors->displacement.count == 0) {
       evaluation.errors.reset();
       evaluation.reason = "the result shows nothing of this page";
+    } else {
+      evaluate_look(picture, truth, page, read_text, evaluation);
     }
   }
   return evaluation;
@@ -202,8 +232,10 @@ Evaluation evaluate(const fs::path& out, const fs::path& truth_folder, const Eva
   evaluate_times(cameras, rig, bound, options, evaluation);
   evaluate_kinds(truth, cameras, bound, options, evaluation);
   progress.begin("pages against the printed ones");
+  std::optional<TextRecogniser> read_text;
+  if (!options.ocr.empty()) read_text.emplace(options.ocr);
   for (const TruthPage& page : truth.pages) {
-    evaluation.pages.push_back(evaluate_page(out, truth, page, options));
+    evaluation.pages.push_back(evaluate_page(out, truth, page, read_text, options));
     progress.advance(static_cast<double>(evaluation.pages.size()) / static_cast<double>(truth.pages.size()));
   }
   for (const int index : pages_in(out))

@@ -11,13 +11,16 @@
 #include "pagesweep/data/figure.h"
 #include "pagesweep/evaluation/compare_kinds.h"
 #include "pagesweep/evaluation/compare_pages.h"
+#include "pagesweep/evaluation/compare_pictures.h"
 #include "pagesweep/evaluation/compare_points.h"
+#include "pagesweep/evaluation/compare_text.h"
 #include "pagesweep/evaluation/compare_times.h"
 
 namespace pagesweep {
 
 struct EvaluationOptions {
   std::string rig;
+  std::string ocr;
   PointComparisonOptions points;
   TimeComparisonOptions times;
   PageComparisonOptions pages;
@@ -25,10 +28,18 @@ struct EvaluationOptions {
   template <class Visitor>
   void describe(Visitor&& visit) {
     visit("rig", rig, "", "rig file; empty: the one of the capture beside the truth's folder");
+    visit("ocr", ocr, "",
+          "language of the printed text, such as eng: tells the character error rate; empty: it does not");
     points.describe(visit);
     times.describe(visit);
     pages.describe(visit);
   }
+};
+
+/// What Tesseract reads on a page, against what is printed there.
+struct TextEvaluation {
+  TextErrors result;      ///< on the result
+  TextErrors flat_truth;  ///< on the picture of the true page: what is not the flattening's fault
 };
 
 /// One page of the truth, or of the result, or of both.
@@ -36,6 +47,9 @@ struct PageEvaluation {
   int index = 1;                     ///< from left to right, 1 first
   std::optional<PageErrors> errors;  ///< nothing: see reason
   std::string reason;                ///< why there are none
+  PictureErrors picture;             ///< NaN where there are none
+  std::optional<TextEvaluation> text;
+  std::string text_reason;  ///< why there is none
 };
 
 /// A result against the truth. What could not be compared says why.

@@ -123,6 +123,22 @@ void add_times(const Evaluation& evaluation, std::vector<Figure>& figures) {
   group.add("offset", "the estimator's middle of the stripe against the true one", times.offset_frames, "frames");
 }
 
+/// How many percent more of the characters are wrong than on the flat truth.
+double excess_of(const TextEvaluation& text) { return text.result.rate - text.flat_truth.rate; }
+
+void add_look(const PageEvaluation& page, std::vector<Figure>& figures) {
+  const std::string name = fmt::format("page_{}", page.index);
+  Group picture(figures, name,
+                page.errors ? "there is no picture of the printed page, or too little of it" : page.reason);
+  picture.add("ms_ssim", "multi-scale structural similarity to the printed page", page.picture.ms_ssim);
+  picture.add("ms_ssim_same_exposure", "the same after the best gain and offset", page.picture.ms_ssim_same_exposure);
+  Group text(figures, name, page.text_reason);
+  const TextEvaluation evaluation = page.text.value_or(TextEvaluation{});
+  text.add_share("cer", "character error rate", evaluation.result.rate);
+  text.add_share("cer_of_truth", "character error rate on the printed page", evaluation.flat_truth.rate);
+  text.add_share("cer_excess", "character error rate minus that of the printed page", excess_of(evaluation));
+}
+
 void add_page(const PageEvaluation& page, std::vector<Figure>& figures) {
   const PageErrors errors = page.errors.value_or(PageErrors{});
   Group group(figures, fmt::format("page_{}", page.index),
@@ -140,26 +156,35 @@ void add_page(const PageEvaluation& page, std::vector<Figure>& figures) {
   group.add("rotation", "askew by", errors.rotation_rad * degrees, "deg");
   group.add_share("covered", "visible part of the true page that is on the result",
                   page.errors ? errors.covered : ErrorSummary::none);
+  add_look(page, figures);
 }
 
 void add_all_pages(const Evaluation& evaluation, std::vector<Figure>& figures) {
-  double rms = 0, max = 0, scale = 0;
+  double rms = 0, p99 = 0, max = 0, scale = 0, ms_ssim = 1, excess = -1;
   std::size_t missing = 0;
   for (const PageEvaluation& page : evaluation.pages) {
     missing += !page.errors;
     if (!page.errors) continue;
     rms = std::max(rms, page.errors->displacement.rms);
+    p99 = std::max(p99, page.errors->displacement.p99);
     max = std::max(max, page.errors->displacement.max);
+    ms_ssim = std::min(ms_ssim, page.picture.ms_ssim);
+    if (page.text) excess = std::max(excess, excess_of(*page.text));
     scale = std::max(scale, std::abs(page.errors->scale_error));
   }
   const bool none = missing == evaluation.pages.size();
   Group group(figures, "pages", "no page could be compared");
   group.add("worst_rms", "dewarping error of the worst page, rms", none ? ErrorSummary::none : rms, "mm");
+  group.add("worst_p99", "dewarping error that 99 % of the worst page keep", none ? ErrorSummary::none : p99, "mm");
   group.add("worst_max", "largest dewarping error of all pages", none ? ErrorSummary::none : max, "mm");
   group.add_share("worst_scale_error", "largest scale error of all pages", none ? ErrorSummary::none : scale);
   group.add("missing", "pages of the truth that could not be compared", static_cast<double>(missing), "pages");
   group.add("unexpected", "pages that the truth does not have", static_cast<double>(evaluation.unexpected_pages.size()),
             "pages");
+  Group looks(figures, "pages", "no page could be compared, or no language was given");
+  looks.add("worst_ms_ssim", "least structural similarity of all pages", none ? ErrorSummary::none : ms_ssim);
+  looks.add_share("worst_cer_excess", "largest excess of the character error rate",
+                  excess < -0.5 ? ErrorSummary::none : excess);
 }
 
 /// Three significant digits, or all of a count.
