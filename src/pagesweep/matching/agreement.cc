@@ -25,15 +25,22 @@ Cell cell_around(double u, double v, int width, int height) {
   return {{left, right, left, right}, {top, top, bottom, bottom}, {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b}};
 }
 
+/// One direction's matches, and their status before they were compared.
+struct Found {
+  Correspondences* matches;
+  const Image<PixelStatus>* status;
+};
+
 /// Whether the match of pixel (x, y) is confirmed from the other side.
-bool is_confirmed(const Correspondences& matches, const Correspondences& back, int x, int y, double max_px) {
+bool is_confirmed(const Correspondences& matches, const Found& other, int x, int y, double max_px) {
+  const Correspondences& back = *other.matches;
   const double u = matches.u(x, y), v = matches.v(x, y);
   const Cell cell = cell_around(u, v, back.width(), back.height());
   double weights = 0, du = 0, dv = 0, sigma = 0;
   int out_of_view = 0, found = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const int cx = cell.x[i], cy = cell.y[i];
-    const PixelStatus status = back.status(cx, cy);
+    const PixelStatus status = (*other.status)(cx, cy);
     out_of_view += status == PixelStatus::outside_view ? 1 : 0;
     if (status != PixelStatus::ok) continue;
     // A step of one picture is about the same step of the other, which serves where corners are missing.
@@ -53,32 +60,23 @@ bool is_confirmed(const Correspondences& matches, const Correspondences& back, i
   return du * du + dv * dv <= tolerance * tolerance;
 }
 
-void mark(const Correspondences& matches, const Correspondences& back, double max_px, Image<PixelStatus>& status) {
-  status = matches.status;
+void judge(const Found& there, const Found& back, double max_px, const PixelSet* only) {
+  Correspondences& matches = *there.matches;
   parallel_rows(matches.height(), [&](int y) {
-    for (int x = 0; x < matches.width(); ++x)
-      if (status(x, y) == PixelStatus::ok && !is_confirmed(matches, back, x, y, max_px))
-        status(x, y) = PixelStatus::inconsistent;
+    for (int x = 0; x < matches.width(); ++x) {
+      if (!takes_part(only, x, y) || (*there.status)(x, y) != PixelStatus::ok) continue;
+      const bool confirmed = is_confirmed(matches, back, x, y, max_px);
+      matches.status(x, y) = confirmed ? PixelStatus::ok : PixelStatus::inconsistent;
+    }
   });
-}
-
-void apply(Image<PixelStatus>& status, Correspondences& matches) {
-  matches.status.swap(status);
-  for (std::size_t i = 0; i < matches.status.size(); ++i) {
-    if (matches.status.data()[i] == PixelStatus::ok) continue;
-    matches.u.data()[i] = matches.v.data()[i] = not_a_number;
-    matches.sigma.data()[i] = matches.slope.data()[i] = not_a_number;
-  }
 }
 
 }  // namespace
 
-void keep_agreeing(MatchPair& pair, double max_px) {
-  Image<PixelStatus> first, second;  // both are judged by what they were
-  mark(pair.from_first, pair.from_second, max_px, first);
-  mark(pair.from_second, pair.from_first, max_px, second);
-  apply(first, pair.from_first);
-  apply(second, pair.from_second);
+void keep_agreeing(MatchPair& pair, const FoundStatus& found, double max_px, const PixelSets& only) {
+  const Found first{&pair.from_first, &found.first}, second{&pair.from_second, &found.second};
+  judge(first, second, max_px, only.first);
+  judge(second, first, max_px, only.second);
 }
 
 }  // namespace pagesweep

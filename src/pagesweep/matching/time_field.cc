@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "pagesweep/base/parallel.h"
 
@@ -32,20 +33,60 @@ bool are_linked(const TimeMap& map, int x, int y, int dx, int dy) {
   return difference <= 3 * around + 6 * noise;
 }
 
+/// Columns of a row.
+struct Columns {
+  int begin = std::numeric_limits<int>::max(), end = 0;
+};
+
+/// In each row, the columns that are within `reach` pixels of one of the set.
+std::vector<Columns> around(const PixelSet* set, int width, int height, int reach) {
+  const auto rows = static_cast<std::size_t>(height);
+  if (!set) return std::vector<Columns>(rows, {0, width});
+  std::vector<Columns> of_set(rows), wider(rows);
+  for (int y = 0; y < height; ++y) {
+    const auto row = set->row(y);
+    const auto is_in = [](std::uint8_t part) { return part != 0; };
+    const auto first = std::ranges::find_if(row, is_in);
+    if (first == row.end()) continue;
+    const auto last = std::find_if(row.rbegin(), row.rend(), is_in);
+    of_set[static_cast<std::size_t>(y)] = {static_cast<int>(first - row.begin()), static_cast<int>(row.rend() - last)};
+  }
+  for (int y = 0; y < height; ++y)
+    for (int other = std::max(0, y - reach); other <= std::min(y + reach, height - 1); ++other) {
+      const Columns& columns = of_set[static_cast<std::size_t>(other)];
+      if (columns.end == 0) continue;
+      Columns& here = wider[static_cast<std::size_t>(y)];
+      here.begin = std::min(here.begin, std::max(0, columns.begin - reach));
+      here.end = std::max(here.end, std::min(columns.end + reach, width));
+    }
+  return wider;
+}
+
 }  // namespace
 
-TimeField::TimeField(const TimeMap& map) : map_(&map), between_(map.width(), map.height(), not_a_number) {
-  Image<std::uint8_t> linked(map.width(), map.height());
+TimeField::TimeField(int width, int height) : linked_(width, height), between_(width, height, not_a_number) {}
+
+TimeField::TimeField(const TimeMap& map) : TimeField(map.width(), map.height()) { update(map, nullptr); }
+
+void TimeField::update(const TimeMap& map, const PixelSet* news) {
+  map_ = &map;
+  constexpr int reach = 3;  // [px] from a pixel whose link depends on another
+  const auto to_link = around(news, map.width(), map.height(), reach);
   parallel_rows(map.height(), [&](int y) {
-    for (int x = 0; x < map.width(); ++x) {
+    const Columns& columns = to_link[static_cast<std::size_t>(y)];
+    for (int x = columns.begin; x < columns.end; ++x) {
       const unsigned links = (are_linked(map, x, y, 1, 0) ? right : 0u) | (are_linked(map, x, y, 0, 1) ? below : 0u);
-      linked(x, y) = static_cast<std::uint8_t>(links);
+      linked_(x, y) = static_cast<std::uint8_t>(links);
     }
   });
+  const auto to_join = around(news, map.width(), map.height(), reach + 1);
   parallel_rows(std::max(0, map.height() - 1), [&](int y) {
-    for (int x = 0; x + 1 < map.width(); ++x)
-      if ((linked(x, y) & right) && (linked(x, y) & below) && (linked(x + 1, y) & below) && (linked(x, y + 1) & right))
-        between_(x, y) = 0;
+    const Columns& columns = to_join[static_cast<std::size_t>(y)];
+    for (int x = columns.begin; x < std::min(columns.end, map.width() - 1); ++x) {
+      const bool all = (linked_(x, y) & right) && (linked_(x, y) & below) && (linked_(x + 1, y) & below) &&
+                       (linked_(x, y + 1) & right);
+      between_(x, y) = all ? 0 : not_a_number;
+    }
   });
 }
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 
 #include "pagesweep/base/image.h"
+#include "pagesweep/data/pixel_set.h"
 #include "pagesweep/data/time_map.h"
 #include "pagesweep/matching/follow_curves.h"
 
@@ -17,6 +19,12 @@ namespace pagesweep {
 class TimeField {
  public:
   explicit TimeField(const TimeMap& map);
+  /// Of a map of that size, which knows nothing yet.
+  TimeField(int width, int height);
+
+  /// Takes note of times that are new, of these pixels alone. The map must outlive this.
+  /// \param news  null: all pixels
+  void update(const TimeMap& map, const PixelSet* news);
 
   /// Time at a position [frames] by bilinear interpolation; NaN where a pixel that takes part is missing or not linked.
   double time_at(const Eigen::Vector2d& pixel) const;
@@ -34,8 +42,9 @@ class TimeField {
   };
   Cell cell_at(const Eigen::Vector2d& pixel) const;
 
-  const TimeMap* map_;
-  Image<float> between_;  ///< 0 where the four pixels from (x, y) to (x + 1, y + 1) are linked, NaN where not
+  const TimeMap* map_ = nullptr;
+  Image<std::uint8_t> linked_;  ///< each pixel's links to the right and below
+  Image<float> between_;        ///< 0 where the four pixels from (x, y) to (x + 1, y + 1) are linked, NaN where not
 };
 
 }  // namespace pagesweep

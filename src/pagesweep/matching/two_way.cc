@@ -11,22 +11,11 @@
 #include <utility>
 
 #include "pagesweep/base/parallel.h"
-#include "pagesweep/matching/agreement.h"
 
 namespace pagesweep {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-/// One camera's pixels and the other camera's picture.
-struct Direction {
-  const RayTable* from;
-  const RayTable* to;
-  const Matcher* matcher;
-  EpipolarGeometry everywhere{*from, *to, {0, 0}};
-
-  EpipolarGeometry geometry(InverseDepthRange range) const { return everywhere.within(range); }
-};
 
 Match find(const Matcher& matcher, const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y,
            double expected) {
@@ -46,77 +35,34 @@ InverseDepthRange allowed_range(const Camera& first, const Camera& second, const
   return {options.far_mm > 0 ? 1 / options.far_mm : 0, options.near_mm > 0 ? 1 / options.near_mm : 10 / baseline};
 }
 
-/// Depths in one camera and in the other.
-struct DepthRanges {
-  InverseDepthRange there, back;
-};
-
-/// Inverse depths of a grid of pixels, kept if the matched pixel's own match leads back.
-std::vector<double> probe_depths(const Direction& there, const Direction& back, const DepthRanges& ranges, int probes) {
-  const EpipolarGeometry geometry = there.geometry(ranges.there), return_geometry = back.geometry(ranges.back);
-  const int width = there.from->width(), height = there.from->height();
-  const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / probes)));
-  std::vector<std::vector<double>> rows(static_cast<std::size_t>((height + stride - 1) / stride));
-  parallel_rows(static_cast<int>(rows.size()), [&](int row) {
-    const auto finder = there.matcher->make_finder(), return_finder = back.matcher->make_finder();
-    for (int x = stride / 2; x < width; x += stride) {
-      const int y = std::min(row * stride + stride / 2, height - 1);
-      const Match match = find(*there.matcher, geometry, *finder, x, y, nan);
-      if (match.status != PixelStatus::ok) continue;
-      const int u = std::clamp(static_cast<int>(std::lround(match.pixel.x())), 0, there.to->width() - 1);
-      const int v = std::clamp(static_cast<int>(std::lround(match.pixel.y())), 0, there.to->height() - 1);
-      const Match returned = find(*back.matcher, return_geometry, *return_finder, u, v, nan);
-      const bool agrees = returned.status == PixelStatus::ok && (returned.pixel - Eigen::Vector2d(x, y)).norm() < 3;
-      if (agrees) rows[static_cast<std::size_t>(row)].push_back(match.inverse_depth);
-    }
-  });
-  std::vector<double> depths;
-  for (const auto& row : rows) depths.insert(depths.end(), row.begin(), row.end());
-  return depths;
-}
-
 /// The depths that the scene shows, but for a thousandth at either end, and some more. A range that is too wide costs
 /// time and a few more ambiguous pixels; one that is too narrow costs the truth.
 /// \param more  as a share of them
 InverseDepthRange narrow(InverseDepthRange allowed, std::vector<double> depths, double more) {
   constexpr std::size_t enough = 100;
   if (depths.size() < enough) return allowed;
-  std::sort(depths.begin(), depths.end());
+  std::ranges::sort(depths);
   const std::size_t tail = depths.size() / 1000;
   const double far = depths[tail], near = depths[depths.size() - 1 - tail];
   const double margin = more * (near - far + 0.1 * near);
   return {std::max(allowed.far, far - margin), std::min(allowed.near, near + margin)};
 }
 
-/// Few pixels look along their whole curves; many look where those found something, and far around it.
-DepthRanges find_ranges(const Direction& there, const Direction& back, InverseDepthRange allowed) {
-  DepthRanges ranges{allowed, allowed};
-  for (const auto& [probes, more] : {std::pair{1000, 1.0}, {5000, 0.2}}) {
-    const DepthRanges before = ranges;
-    ranges.there = narrow(allowed, probe_depths(there, back, before, probes), more);
-    ranges.back = narrow(allowed, probe_depths(back, there, {before.back, before.there}, probes), more);
-  }
-  return ranges;
-}
-
 constexpr int rows_at_once = 16;
 
-Correspondences match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress) {
-  constexpr int band = 8 * rows_at_once;  // rows between two reports of progress
-  const EpipolarGeometry geometry = direction.geometry(range);
-  Correspondences matches(direction.from->width(), direction.from->height());
-  progress.begin(fmt::format("matching {} with {}", direction.from->camera().name, direction.to->camera().name));
-  for (int top = 0; top < matches.height(); top += band) {
-    const int rows = std::min(band, matches.height() - top);
-    parallel_ranges(rows, rows_at_once, [&](int begin, int end) {
-      direction.matcher->match_rows(geometry, top + begin, top + end, matches);
-    });
-    progress.advance(static_cast<double>(top + rows) / matches.height());
-  }
-  return matches;
-}
-
 }  // namespace
+
+/// One camera's pixels and the other camera's picture.
+struct TwoWayMatching::Direction {
+  const RayTable* from;
+  const RayTable* to;
+  const Matcher* matcher;
+  EpipolarGeometry everywhere{*from, *to, {0, 0}};
+
+  EpipolarGeometry geometry(InverseDepthRange range) const { return everywhere.within(range); }
+  void probe(const Direction& back, InverseDepthRange range, InverseDepthRange range_back, int probes,
+             std::vector<double>& depths) const;
+};
 
 void put(const Match& match, int x, int y, Correspondences& matches) {
   matches.status(x, y) = match.status;
@@ -135,9 +81,18 @@ void Matcher::match_rows(const EpipolarGeometry& geometry, int top, int bottom, 
   expected.fill(nan);
   for (int x = 0; x < matches.width(); ++x) {
     column.fill(Match::none(PixelStatus::not_computed));
-    finder->find_quickly(x, top, geometry, std::span(expected).first(rows), std::span(column).first(rows));
+    std::array<double, rows_at_once> asked;
+    bool any = false;
+    for (std::size_t row = 0; row < rows; ++row) {
+      const bool wanted = is_wanted(x, top + static_cast<int>(row));
+      asked[row] = wanted ? expected[row] : nan;
+      any = any || wanted;
+    }
+    if (!any) continue;
+    finder->find_quickly(x, top, geometry, std::span(asked).first(rows), std::span(column).first(rows));
     for (std::size_t row = 0; row < rows; ++row) {
       const int y = top + static_cast<int>(row);
+      if (!is_wanted(x, y)) continue;
       Match& match = column[row];
       if (match.status == PixelStatus::not_computed) match = find(*this, geometry, *finder, x, y, expected[row]);
       put(match, x, y, matches);
@@ -146,16 +101,100 @@ void Matcher::match_rows(const EpipolarGeometry& geometry, int top, int bottom, 
   }
 }
 
+/// Inverse depths of the wanted ones of a grid of pixels, kept if the matched pixel's own match leads back. They join
+/// those that are known.
+void TwoWayMatching::Direction::probe(const Direction& back, InverseDepthRange range, InverseDepthRange range_back,
+                                      int probes, std::vector<double>& depths) const {
+  const EpipolarGeometry there_geometry = geometry(range), return_geometry = back.geometry(range_back);
+  const int width = from->width(), height = from->height();
+  const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / probes)));
+  std::vector<std::vector<double>> rows(static_cast<std::size_t>((height + stride - 1) / stride));
+  parallel_rows(static_cast<int>(rows.size()), [&](int row) {
+    const auto finder = matcher->make_finder(), return_finder = back.matcher->make_finder();
+    for (int x = stride / 2; x < width; x += stride) {
+      const int y = std::min(row * stride + stride / 2, height - 1);
+      if (!matcher->is_wanted(x, y)) continue;
+      const Match match = find(*matcher, there_geometry, *finder, x, y, nan);
+      if (match.status != PixelStatus::ok) continue;
+      const int u = std::clamp(static_cast<int>(std::lround(match.pixel.x())), 0, to->width() - 1);
+      const int v = std::clamp(static_cast<int>(std::lround(match.pixel.y())), 0, to->height() - 1);
+      const Match returned = find(*back.matcher, return_geometry, *return_finder, u, v, nan);
+      const bool agrees = returned.status == PixelStatus::ok && (returned.pixel - Eigen::Vector2d(x, y)).norm() < 3;
+      if (agrees) rows[static_cast<std::size_t>(row)].push_back(match.inverse_depth);
+    }
+  });
+  for (const auto& row : rows) depths.insert(depths.end(), row.begin(), row.end());
+}
+
+/// Few pixels look along their whole curves; many look where those found something, and far around it.
+TwoWayMatching::DepthRanges TwoWayMatching::find_ranges(const Direction& there, const Direction& back) {
+  DepthRanges ranges{allowed_, allowed_};
+  const auto look = [&](Probes& found, int probes, double more) {
+    const DepthRanges before = ranges;
+    there.probe(back, before.there, before.back, probes, found.there);
+    back.probe(there, before.back, before.there, probes, found.back);
+    ranges = {narrow(allowed_, found.there, more), narrow(allowed_, found.back, more)};
+  };
+  look(few_, 1000, 1.0);
+  look(many_, 5000, 0.2);
+  return ranges;
+}
+
+void TwoWayMatching::match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress,
+                                   Correspondences& matches) {
+  constexpr int band = 8 * rows_at_once;  // rows between two reports of progress
+  const EpipolarGeometry geometry = direction.geometry(range);
+  progress.begin(fmt::format("matching {} with {}", direction.from->camera().name, direction.to->camera().name));
+  for (int top = 0; top < matches.height(); top += band) {
+    const int rows = std::min(band, matches.height() - top);
+    parallel_ranges(rows, rows_at_once, [&](int begin, int end) {
+      direction.matcher->match_rows(geometry, top + begin, top + end, matches);
+    });
+    progress.advance(static_cast<double>(top + rows) / matches.height());
+  }
+}
+
+TwoWayMatching::TwoWayMatching(const RayTable& first, const RayTable& second, const MatchOptions& options)
+    : first_(first),
+      second_(second),
+      max_disagreement_px_(options.max_disagreement_px),
+      allowed_(allowed_range(first.camera(), second.camera(), options)),
+      range_is_known_(options.near_mm > 0 && options.far_mm > 0),
+      pair_{Correspondences(first.width(), first.height()), Correspondences(second.width(), second.height())},
+      found_{pair_.from_first.status, pair_.from_second.status} {}
+
+void TwoWayMatching::match(const Matcher& from_first, const Matcher& from_second, Progress& progress) {
+  const Direction there{&first_, &second_, &from_first}, back{&second_, &first_, &from_second};
+  progress.begin("looking for the range of depths");
+  const DepthRanges ranges = range_is_known_ ? DepthRanges{allowed_, allowed_} : find_ranges(there, back);
+  const auto match = [&](const Direction& direction, InverseDepthRange range, Correspondences& matches,
+                         Image<PixelStatus>& found) {
+    match_one_way(direction, range, progress, matches);
+    parallel_rows(matches.height(), [&](int y) {
+      for (int x = 0; x < matches.width(); ++x)
+        if (direction.matcher->is_wanted(x, y)) found(x, y) = matches.status(x, y);
+    });
+  };
+  match(there, ranges.there, pair_.from_first, found_.first);
+  match(back, ranges.back, pair_.from_second, found_.second);
+}
+
+MatchPair TwoWayMatching::matches() && {
+  for (Correspondences* matches : {&pair_.from_first, &pair_.from_second})
+    for (std::size_t i = 0; i < matches->status.size(); ++i) {
+      if (matches->status.data()[i] == PixelStatus::ok) continue;
+      matches->u.data()[i] = matches->v.data()[i] = not_a_number;
+      matches->sigma.data()[i] = matches->slope.data()[i] = not_a_number;
+    }
+  return std::move(pair_);
+}
+
 MatchPair match_both_ways(const RayTable& first, const RayTable& second, const Matcher& from_first,
                           const Matcher& from_second, const MatchOptions& options, Progress& progress) {
-  const InverseDepthRange allowed = allowed_range(first.camera(), second.camera(), options);
-  const Direction there{&first, &second, &from_first}, back{&second, &first, &from_second};
-  const bool known = options.near_mm > 0 && options.far_mm > 0;
-  progress.begin("looking for the range of depths");
-  const DepthRanges ranges = known ? DepthRanges{allowed, allowed} : find_ranges(there, back, allowed);
-  MatchPair pair{match_one_way(there, ranges.there, progress), match_one_way(back, ranges.back, progress)};
-  keep_agreeing(pair, options.max_disagreement_px);
-  return pair;
+  TwoWayMatching matching(first, second, options);
+  matching.match(from_first, from_second, progress);
+  matching.keep_agreeing({});
+  return std::move(matching).matches();
 }
 
 }  // namespace pagesweep

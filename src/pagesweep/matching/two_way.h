@@ -5,7 +5,9 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <vector>
 
+#include "pagesweep/matching/agreement.h"
 #include "pagesweep/matching/epipolar_curve.h"
 #include "pagesweep/matching/match_epipolar.h"
 
@@ -41,18 +43,65 @@ class MatchFinder {
 /// One camera's pixels as they can be matched with the other's: what the two matchers differ in.
 class Matcher {
  public:
+  /// \param only  pixels that are wanted; null: all
+  explicit Matcher(const PixelSet* only = nullptr) : only_(only) {}
   virtual ~Matcher() = default;
+  bool is_wanted(int x, int y) const { return takes_part(only_, x, y); }
   /// Why the pixel cannot be matched at all; ok if it can.
   virtual PixelStatus status_of(int x, int y) const = 0;
   virtual std::unique_ptr<MatchFinder> make_finder() const = 0;
   /// Matches the rows top ... bottom - 1: some side by side, each from left to right.
   virtual void match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const;
+
+ private:
+  const PixelSet* only_;
 };
 
 /// Enters one pixel's match, or why it has none.
 void put(const Match& match, int x, int y, Correspondences& matches);
 
-/// Matches all pixels both ways, finding the depth ranges first where they are not given, and keeps what agrees.
+/// Both ways between two cameras, all pixels at once or part by part.
+class TwoWayMatching {
+ public:
+  /// The cameras must outlive this.
+  /// \throws std::invalid_argument  if they are at one place or near_mm, far_mm contradict each other
+  TwoWayMatching(const RayTable& first, const RayTable& second, const MatchOptions& options);
+
+  /// Finds matches of the pixels that the matchers want, and the depth ranges first where they are not given: those of
+  /// all parts so far.
+  void match(const Matcher& from_first, const Matcher& from_second, Progress& progress);
+  /// Keeps what agrees.
+  void keep_agreeing(const PixelSets& only) { pagesweep::keep_agreeing(pair_, found_, max_disagreement_px_, only); }
+
+  /// What was found so far. Where a status is not ok, other values mean nothing.
+  const MatchPair& matches() const& { return pair_; }
+  /// To be taken away; where a status is not ok, other values are NaN.
+  MatchPair matches() &&;
+
+ private:
+  /// Depths in one camera and in the other.
+  struct DepthRanges {
+    InverseDepthRange there, back;
+  };
+  /// What probes found: depths in one camera and in the other.
+  struct Probes {
+    std::vector<double> there, back;
+  };
+  struct Direction;
+  DepthRanges find_ranges(const Direction& there, const Direction& back);
+  void match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress, Correspondences& matches);
+
+  const RayTable& first_;
+  const RayTable& second_;
+  double max_disagreement_px_;
+  InverseDepthRange allowed_;
+  bool range_is_known_;
+  Probes few_, many_;
+  MatchPair pair_;
+  FoundStatus found_;
+};
+
+/// Matches all pixels both ways and keeps what agrees.
 MatchPair match_both_ways(const RayTable& first, const RayTable& second, const Matcher& from_first,
                           const Matcher& from_second, const MatchOptions& options, Progress& progress);
 

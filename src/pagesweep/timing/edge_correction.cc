@@ -63,22 +63,62 @@ class Surroundings {
   Neighbourhood around_;
 };
 
-/// Sums over pixels, for a straight line through the origin.
-struct Sums {
-  double ll = 0, lm = 0, mm = 0;  ///< leaning and misfit, both over sigma
-  double fourth = 0, excess = 0;  ///< leaning^4, leaning^2 (rest^2 - sigma^2)
+}  // namespace
+
+/// Sums over edges, for a straight line through the origin.
+struct EdgeFit::Sums {
+  double ll = 0, lm = 0, mm = 0;  ///< leaning and misfit
+  double fourth = 0, excess = 0;  ///< leaning^4, leaning^2 (rest^2 - 1)
   long long count = 0;
 };
 
-/// Sums over the pixels at edges whose rest, with that gain, is within `limit` sigmas.
-Sums gather(const TimeMap& times, const Image<EdgeComparison>& comparisons, double gain, double limit) {
-  Sums sums;
+SpotOffsets offsets_from_amplitude(const TimeMap& times, const PixelSet* only) {
+  SpotOffsets offsets(times.width(), times.height());
+  parallel_rows(times.height(), [&](int y) {
+    const auto amplitude = [&](int x, int row) {
+      return times.amplitude.contains(x, row) && times.status(x, row) == PixelStatus::ok ? times.amplitude(x, row)
+                                                                                         : not_a_number;
+    };
+    for (int x = 0; x < times.width(); ++x) {
+      if (!takes_part(only, x, y)) continue;
+      const float here = amplitude(x, y);
+      offsets.dx(x, y) =
+          derivative(amplitude(x - 2, y), amplitude(x - 1, y), amplitude(x + 1, y), amplitude(x + 2, y)) / here;
+      offsets.dy(x, y) =
+          derivative(amplitude(x, y - 2), amplitude(x, y - 1), amplitude(x, y + 1), amplitude(x, y + 2)) / here;
+    }
+  });
+  return offsets;
+}
+
+Image<EdgeComparison> compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets,
+                                                const PixelSet* only) {
+  if (times.width() != offsets.width() || times.height() != offsets.height())
+    throw std::invalid_argument("edge correction: time map and offsets differ in size");
+  Image<EdgeComparison> comparisons(times.width(), times.height(), EdgeComparison{});
+  parallel_rows(times.height(), [&](int y) {
+    Surroundings surroundings(times, offsets);
+    for (int x = 0; x < times.width(); ++x)
+      if (takes_part(only, x, y)) comparisons(x, y) = surroundings.look(x, y);
+  });
+  return comparisons;
+}
+
+void EdgeFit::add(const TimeMap& times, const Image<EdgeComparison>& comparisons) {
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
     const EdgeComparison& seen = comparisons.data()[i];
     if (!seen.one_surface) continue;
-    const double sigma = times.sigma.data()[i];
-    const double leaning = seen.leaning / sigma, misfit = seen.misfit / sigma, rest = misfit - gain * leaning;
-    if (!(std::abs(leaning) >= least_leaning) || !(std::abs(rest) < limit)) continue;
+    const float sigma = times.sigma.data()[i], leaning = seen.leaning / sigma;
+    if (std::abs(leaning) >= least_leaning) edges_.push_back({leaning, seen.misfit / sigma});
+  }
+}
+
+/// Sums over the edges whose rest, with that gain, is within `limit` sigmas.
+EdgeFit::Sums EdgeFit::gather(double gain, double limit) const {
+  Sums sums;
+  for (const auto& [leaning_sigmas, misfit_sigmas] : edges_) {
+    const double leaning = leaning_sigmas, misfit = misfit_sigmas, rest = misfit - gain * leaning;
+    if (!(std::abs(rest) < limit)) continue;
     const double square = leaning * leaning;
     sums.ll += square;
     sums.lm += leaning * misfit;
@@ -90,58 +130,33 @@ Sums gather(const TimeMap& times, const Image<EdgeComparison>& comparisons, doub
   return sums;
 }
 
-}  // namespace
-
-SpotOffsets offsets_from_amplitude(const TimeMap& times) {
-  SpotOffsets offsets(times.width(), times.height());
-  parallel_rows(times.height(), [&](int y) {
-    const auto amplitude = [&](int x, int row) {
-      return times.amplitude.contains(x, row) && times.status(x, row) == PixelStatus::ok ? times.amplitude(x, row)
-                                                                                         : not_a_number;
-    };
-    for (int x = 0; x < times.width(); ++x) {
-      const float here = amplitude(x, y);
-      offsets.dx(x, y) =
-          derivative(amplitude(x - 2, y), amplitude(x - 1, y), amplitude(x + 1, y), amplitude(x + 2, y)) / here;
-      offsets.dy(x, y) =
-          derivative(amplitude(x, y - 2), amplitude(x, y - 1), amplitude(x, y + 1), amplitude(x, y + 2)) / here;
-    }
-  });
-  return offsets;
-}
-
-Image<EdgeComparison> compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets) {
-  if (times.width() != offsets.width() || times.height() != offsets.height())
-    throw std::invalid_argument("edge correction: time map and offsets differ in size");
-  Image<EdgeComparison> comparisons(times.width(), times.height(), EdgeComparison{});
-  parallel_rows(times.height(), [&](int y) {
-    Surroundings surroundings(times, offsets);
-    for (int x = 0; x < times.width(); ++x) comparisons(x, y) = surroundings.look(x, y);
-  });
-  return comparisons;
-}
-
-EdgeCorrection fit_edges(const TimeMap& times, const Image<EdgeComparison>& comparisons) {
+EdgeCorrection EdgeFit::fit() const {
   constexpr double widest = 20, usual = 6;
   EdgeCorrection correction;
   // Outliers are what the last gain leaves far away; the limit narrows as the gain gets better.
   double gain = 0;
   Sums sums;
   for (const double limit : {widest, usual, usual}) {
-    sums = gather(times, comparisons, gain, limit);
+    sums = gather(gain, limit);
     if (sums.count < 100 || !(sums.ll > 0)) return correction;
     gain = sums.lm / sums.ll;
   }
   const double gain_sigma = 1 / std::sqrt(sums.ll);
   correction.edges = sums.count;
   if (gain < 5 * gain_sigma) return correction;
-  sums = gather(times, comparisons, gain, usual);
+  sums = gather(gain, usual);
   correction.gain = gain;
   const double rest = sums.mm - 2 * gain * sums.lm + gain * gain * sums.ll;
   correction.before = std::sqrt(sums.mm / static_cast<double>(sums.count));
   correction.after = std::sqrt(rest / static_cast<double>(sums.count));
   correction.scatter = std::sqrt(std::max(0.0, sums.excess / sums.fourth)) / gain;
   return correction;
+}
+
+EdgeCorrection fit_edges(const TimeMap& times, const Image<EdgeComparison>& comparisons) {
+  EdgeFit edges;
+  edges.add(times, comparisons);
+  return edges.fit();
 }
 
 void correct_edges(TimeMap& times, const Image<EdgeComparison>& comparisons, const EdgeCorrection& correction) {

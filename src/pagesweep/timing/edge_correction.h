@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <vector>
+
+#include "pagesweep/data/pixel_set.h"
 #include "pagesweep/data/spot_offsets.h"
 #include "pagesweep/data/time_map.h"
 
@@ -9,7 +12,8 @@ namespace pagesweep {
 /// The spots' middles as the amplitudes tell them, for a point spread function of variance 1 px^2: the gradient of the
 /// logarithm of the amplitude (Tweedie's formula; B. Efron, Tweedie's formula and selection bias, 2011). For a Gaussian
 /// point spread function it is exact up to the amplitudes' noise and sampling. See docs/derivations/edges.md.
-SpotOffsets offsets_from_amplitude(const TimeMap& times);
+/// \param only  other pixels get none; null: all pixels
+SpotOffsets offsets_from_amplitude(const TimeMap& times, const PixelSet* only = nullptr);
 
 /// How one pixel's time compares with the plane through those around it.
 struct EdgeComparison {
@@ -23,7 +27,9 @@ struct EdgeComparison {
 /// Compares each time value whose offset could matter with the plane through those around it: where offset times
 /// steepness is far below the value's standard deviation, there is nothing to compare.
 /// \throws std::invalid_argument  if the sizes differ
-Image<EdgeComparison> compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets);
+/// \param only  other pixels are not compared; null: all pixels
+Image<EdgeComparison> compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets,
+                                                const PixelSet* only = nullptr);
 
 /// What a map of time values says about spot offsets.
 struct EdgeCorrection {
@@ -35,7 +41,24 @@ struct EdgeCorrection {
 };
 
 /// Across a print edge a time value is off by gain offset . gradient(time), if the offsets are true. The gain is fitted
-/// robustly; one that is not significant is 0.
+/// robustly to the pixels that were compared so far; one that is not significant is 0.
+class EdgeFit {
+ public:
+  /// \param times  those that were compared
+  void add(const TimeMap& times, const Image<EdgeComparison>& comparisons);
+  EdgeCorrection fit() const;
+
+ private:
+  struct Edge {
+    float leaning, misfit;  ///< both over the time value's sigma
+  };
+  struct Sums;
+  Sums gather(double gain, double limit) const;
+
+  std::vector<Edge> edges_;
+};
+
+/// The fit to all pixels that were compared.
 EdgeCorrection fit_edges(const TimeMap& times, const Image<EdgeComparison>& comparisons);
 
 /// Moves time values from the middles of the spots, where they are true, to the pixels' centres; sigma grows by what

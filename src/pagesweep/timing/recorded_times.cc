@@ -51,7 +51,7 @@ bool RecordedTimes::is_settled(const Tile& tile) const {
   if (seen.waiting > 0) return false;
   const Sequence& sequence = recorder_.windows().sequence();
   const WidthTile place = width_tile(sequence.width, sequence.height, tile.column, tile.row);
-  return seen.pixels == place.width * place.height || seen.windows == tile.recorded_before;
+  return seen.pixels == place.width * place.height || seen.clear == tile.clear_before;
 }
 
 bool RecordedTimes::are_around_settled(const Tile& tile) const {
@@ -79,6 +79,7 @@ void RecordedTimes::measure_widths(const std::vector<Tile*>& tiles) {
       const WidthTile place = width_tile(windows.sequence().width, windows.sequence().height, tile.column, tile.row);
       width_tiles_(tile.column, tile.row) = measure_width(row, place, profile_, noise_);
       tile.measured_from = recorded(tile);
+      tile.measured_clear = clear(tile);
     }
   });
   widths_ = widths_of_tiles(width_tiles_);
@@ -95,21 +96,28 @@ void RecordedTimes::estimate(const std::vector<Tile*>& tiles) {
       const WidthTile place = width_tile(windows.sequence().width, windows.sequence().height, tile.column, tile.row);
       for (int y = place.top; y < place.top + place.height; ++y) times.estimate(y, place.left, place.width);
       tile.estimated_from = recorded(tile);
+      tile.estimated_clear = clear(tile);
       tile.widths = widths_around(tile);
     }
   });
 }
 
+double RecordedTimes::known_until() const {
+  double until = recorder_.recorded_until();
+  for (const Tile& tile : tiles_)
+    if (tile.estimated_clear != clear(tile)) until = std::min(until, recorder_.earliest(tile.column, tile.row));
+  return until;
+}
+
 void RecordedTimes::look(const Frames& frames, int end) {
-  for (Tile& tile : tiles_) tile.recorded_before = recorded(tile);
+  for (Tile& tile : tiles_) tile.clear_before = clear(tile);
   recorder_.look(frames, end, false);
   std::vector<Tile*> to_measure, to_estimate;
   for (Tile& tile : tiles_)
-    if (is_settled(tile) && tile.measured_from != recorded(tile)) to_measure.push_back(&tile);
+    if (is_settled(tile) && tile.measured_clear != clear(tile)) to_measure.push_back(&tile);
   measure_widths(to_measure);
   for (Tile& tile : tiles_)
-    if (recorded(tile) > 0 && tile.estimated_from != recorded(tile) && are_around_settled(tile))
-      to_estimate.push_back(&tile);
+    if (tile.estimated_clear != clear(tile) && are_around_settled(tile)) to_estimate.push_back(&tile);
   estimate(to_estimate);
 }
 

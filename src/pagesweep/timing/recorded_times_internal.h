@@ -32,6 +32,10 @@ class RecordedTimes {
   /// Looks at the frames before `end`, see StripeRecorder::look(), and estimates what the stripe has left.
   void look(const Frames& frames, int end);
   int first_needed() const { return recorder_.first_needed(); }
+  /// What is estimated so far.
+  const TimeMap& so_far() const { return map_; }
+  /// [frames] Pixels that the stripe passed before are estimated, but for those that hardly show it.
+  double known_until() const;
   /// Looks at all that is left when no more frames will come. Once, at the end.
   void finish(const Frames& frames);
 
@@ -44,12 +48,15 @@ class RecordedTimes {
   /// What is known of a tile.
   struct Tile {
     int column = 0, row = 0;
-    int recorded_before = 0;        ///< windows, one look ago
+    int clear_before = 0;           ///< clear windows, one look ago
     int measured_from = 0;          ///< windows that its width was measured from
+    int measured_clear = 0;         ///< clear ones of them
     int estimated_from = -1;        ///< windows that its times were estimated from
+    int estimated_clear = 0;        ///< clear ones of them
     std::array<float, 9> widths{};  ///< of it and around it, which they were estimated with
   };
   int recorded(const Tile& tile) const { return recorder_.tiles()(tile.column, tile.row).windows; }
+  int clear(const Tile& tile) const { return recorder_.tiles()(tile.column, tile.row).clear; }
   /// Whether the stripe is not in the tile: it has passed all its pixels, or some and then nothing more happened.
   bool is_settled(const Tile& tile) const;
   bool are_around_settled(const Tile& tile) const;

@@ -18,6 +18,8 @@ constexpr int columns_at_once = 256;  // whose sums stay in the cache
 constexpr int most_apart = 32;        // [frames] between the bells of pixels that are cut out together
 /// Half a sigma less than a bell needs to be told from noise: between two blocks the response is that much lower.
 constexpr float least_significance = 3;
+/// What noise does not reach in a whole camera.
+constexpr float clear_significance = 7;
 
 /// Counts the frames begin, begin + 1, ... before `end` in which each pixel of row y is clipped.
 template <class T>
@@ -65,6 +67,16 @@ int StripeRecorder::first_needed() const {
   const int block = search_.block();
   const int first_of_window = (ready_done_ + 2) * block - (block + 1) / 2 - 1 - windows_.half();
   return std::max(0, std::min(first_of_window, search_.first_needed(places_done_)));
+}
+
+double StripeRecorder::earliest(int column, int row) const {
+  const WidthTile place = width_tile(windows_.sequence().width, windows_.sequence().height, column, row);
+  double earliest = std::numeric_limits<double>::infinity();
+  for (int y = place.top; y < place.top + place.height; ++y)
+    for (int x = place.left; x < place.left + place.width; ++x)
+      if (windows_.centre(x, y) != StripeWindows::none && windows_.significance(x, y) >= clear_significance)
+        earliest = std::min<double>(earliest, windows_.centre(x, y));
+  return earliest;
 }
 
 void StripeRecorder::look(const Frames& frames, int end, bool ended) {
@@ -118,11 +130,13 @@ void StripeRecorder::record(const Step& step, const RawRow& rows, int y, int lef
     if (best == recorded_place_(x, y)) continue;
     const float significance = search_.significance(x, y);
     if (significance < least_significance) continue;
+    const bool is_clear = significance >= clear_significance;
     if (best > step.last_ready) {
-      ++tile.waiting;
+      tile.waiting += is_clear;
       continue;
     }
     scratch.ready.push_back({x, search_.frame(x, y, windows_.sequence().count)});
+    tile.clear += is_clear;
     tile.pixels += windows_.centre(x, y) == StripeWindows::none;
     recorded_place_(x, y) = best;
     windows_.set(x, y, scratch.ready.back().centre, significance);

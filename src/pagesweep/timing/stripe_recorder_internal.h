@@ -37,10 +37,15 @@ class StripeRecorder {
   /// What was recorded of a tile so far.
   struct Tile {
     int windows = 0;  ///< those included that another has replaced
+    int clear = 0;    ///< of them, those whose bell is not noise
     int pixels = 0;   ///< that have a window
-    int waiting = 0;  ///< pixels whose bell is not over yet
+    int waiting = 0;  ///< pixels whose bell is clear and not over yet
   };
   const Image<Tile>& tiles() const { return tiles_; }
+  /// [frames] Clear bells whose middle lies before have windows.
+  double recorded_until() const { return (ready_done_ + 1) * search_.block() - 0.5; }
+  /// [frames] Middle of the earliest clear bell of a tile; infinity if there is none.
+  double earliest(int column, int row) const;
   /// In how many frames each pixel is clipped (255: that many or more).
   Image<std::uint8_t>& clipped_frames() { return clipped_; }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -75,6 +76,15 @@ void TimeStream::follow(int end) {
   }
   looked_at_ = end;
 }
+
+double TimeStream::known_until() const {
+  if (!learned_) return -std::numeric_limits<double>::infinity();
+  double until = std::numeric_limits<double>::infinity();
+  for (const auto& camera : learned_->cameras) until = std::min(until, camera->known_until());
+  return until;
+}
+
+const TimeMap& TimeStream::so_far(std::size_t camera) const { return learned_->cameras[camera]->so_far(); }
 
 Timing TimeStream::finish(Progress& progress) {
   for (std::size_t c = 0; c < frames_.size(); ++c)

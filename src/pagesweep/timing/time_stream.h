@@ -27,6 +27,12 @@ class TimeStream {
   /// \throws std::invalid_argument  if a frame does not fit its sequence
   void add(FrameSet set);
 
+  /// [frames] Pixels of all cameras that the stripe passed before have their times, but for those that hardly show it.
+  /// What is known may still change a little where more light comes later. Minus infinity: nothing is known yet.
+  double known_until() const;
+  /// A camera's times so far. \pre known_until() is finite
+  const TimeMap& so_far(std::size_t camera) const;
+
   /// When the last frame is there. Once.
   /// \throws Error no_result  if no stripe passes
   Timing finish(Progress& progress = no_progress());
