@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "pagesweep/base/b_spline.h"
@@ -14,39 +15,18 @@
 namespace pagesweep {
 namespace {
 
-struct Sighting {
+/// A point and when the light passed it.
+struct Crossing {
   Eigen::Vector3d point;  ///< [mm] rig frame, later along (e, f, z)
   double time;            ///< [frames]
   double weight;          ///< [1/mm^2]
 };
 
-/// Every n-th pixel, so that about 300,000 take part: more would not change the planes by a micrometre.
-std::vector<Sighting> collect(std::span<const PointMap> points, std::span<const TimeMap> times) {
-  std::size_t pixels = 0;
-  for (std::size_t c = 0; c < points.size(); ++c) {
-    if (points[c].width() != times[c].width() || points[c].height() != times[c].height())
-      throw std::invalid_argument("calibrate_light: points and times differ in size");
-    pixels += points[c].x.size();
-  }
-  const std::size_t stride = std::max<std::size_t>(1, pixels / 300000);
-  std::vector<Sighting> sightings;
-  for (std::size_t c = 0; c < points.size(); ++c)
-    for (std::size_t i = 0; i < points[c].x.size(); i += stride) {
-      const float sigma = points[c].sigma.data()[i];
-      if (points[c].status.data()[i] != PixelStatus::ok || times[c].status.data()[i] != PixelStatus::ok || !(sigma > 0))
-        continue;
-      sightings.push_back({{points[c].x.data()[i], points[c].y.data()[i], points[c].z.data()[i]},
-                           times[c].time.data()[i],
-                           1 / (static_cast<double>(sigma) * sigma)});
-    }
-  return sightings;
-}
-
 /// Direction over the table in which time grows, from a straight line fit of time to place.
-Eigen::Vector3d sweep_direction(const std::vector<Sighting>& sightings) {
+Eigen::Vector3d sweep_direction(const std::vector<Crossing>& crossings) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const Sighting& s : sightings) {
+  for (const Crossing& s : crossings) {
     const Eigen::Vector3d row(s.point.x(), s.point.y(), 1);
     normal += row * row.transpose();
     right += row * s.time;
@@ -58,21 +38,21 @@ Eigen::Vector3d sweep_direction(const std::vector<Sighting>& sightings) {
 /// e . X = d(t) - (a0 + a1 s) f . X - (b0 + b1 s) z, with s the time from -1 to 1.
 class SweepFit {
  public:
-  SweepFit(std::vector<Sighting> sightings, double begin, double end, const Eigen::Vector3d& along)
-      : sightings_(std::move(sightings)), begin_(begin), end_(end), splines_(breaks(begin, end)), along_(along) {
+  SweepFit(std::vector<Crossing> crossings, double begin, double end, const Eigen::Vector3d& along)
+      : crossings_(std::move(crossings)), begin_(begin), end_(end), splines_(breaks(begin, end)), along_(along) {
     const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(along_);
-    for (Sighting& s : sightings_) s.point = {along_.dot(s.point), across.dot(s.point), s.point.z()};
+    for (Crossing& s : crossings_) s.point = {along_.dot(s.point), across.dot(s.point), s.point.z()};
   }
 
   /// Robust fit: Tukey's weights on the residual over a scale from its median.
   void solve() {
-    std::vector<double> robust(sightings_.size(), 1.0);
+    std::vector<double> robust(crossings_.size(), 1.0);
     for (int pass = 0; pass < 4; ++pass) {
       solve(robust);
       scale_ = 1.4826 * median_residual();
       const double limit = 4.7 * std::max(scale_, 1e-6);
-      for (std::size_t k = 0; k < sightings_.size(); ++k) {
-        const double part = residual(sightings_[k]) / limit;
+      for (std::size_t k = 0; k < crossings_.size(); ++k) {
+        const double part = residual(crossings_[k]) / limit;
         robust[k] = std::abs(part) < 1 ? std::pow(1 - part * part, 2) : 0;
       }
     }
@@ -129,14 +109,14 @@ class SweepFit {
     for (int k = 0; k < 4; ++k) way += row.value[static_cast<std::size_t>(k)] * unknowns_[4 + row.first + k];
     return way;
   }
-  double residual(const Sighting& s) const {
+  double residual(const Crossing& s) const {
     const double r = relative(s.time);
     return s.point.x() + (unknowns_[0] + r * unknowns_[1]) * s.point.y() +
            (unknowns_[2] + r * unknowns_[3]) * s.point.z() - way_at(s.time);
   }
   double median_residual() const {
     std::vector<double> misses;
-    for (const Sighting& s : sightings_) misses.push_back(std::abs(residual(s)));
+    for (const Crossing& s : crossings_) misses.push_back(std::abs(residual(s)));
     const auto middle = misses.begin() + static_cast<std::ptrdiff_t>(misses.size() / 2);
     std::nth_element(misses.begin(), middle, misses.end());
     return *middle;
@@ -149,7 +129,7 @@ class SweepFit {
     return {normal.normalized(), way_at(time) / normal.norm()};
   }
 
-  std::vector<Sighting> sightings_;
+  std::vector<Crossing> crossings_;
   double begin_, end_;
   CubicBSplines splines_;
   Eigen::Vector3d along_;
@@ -162,8 +142,8 @@ void SweepFit::solve(const std::vector<double>& robust) {
   const int count = 4 + spline_count();
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(count, count);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
-  for (std::size_t k = 0; k < sightings_.size(); ++k) {
-    const Sighting& s = sightings_[k];
+  for (std::size_t k = 0; k < crossings_.size(); ++k) {
+    const Crossing& s = crossings_[k];
     const double weight = robust[k] * s.weight, r = relative(s.time);
     if (weight == 0) continue;
     const BSplineRow row = splines_.at(s.time);
@@ -187,16 +167,44 @@ void SweepFit::solve(const std::vector<double>& robust) {
 
 }  // namespace
 
-std::optional<LightSweep> calibrate_light(std::span<const PointMap> points, std::span<const TimeMap> times) {
-  if (points.size() != times.size()) throw std::invalid_argument("calibrate_light: as many points as times, please");
-  std::vector<Sighting> sightings = collect(points, times);
-  if (sightings.size() < 1000) return std::nullopt;
-  const auto [begin, end] = std::ranges::minmax(sightings, {}, &Sighting::time);
+LightCalibration::LightCalibration(std::size_t pixels) {
+  // More points would not change the planes by a micrometre.
+  constexpr std::size_t enough = 100000;
+  stride_ = std::max<std::size_t>(1, pixels / enough);
+}
+
+void LightCalibration::add(const PointMap& points, const TimeMap& times, const PixelSet* only) {
+  if (points.width() != times.width() || points.height() != times.height())
+    throw std::invalid_argument("calibrate_light: points and times differ in size");
+  for (std::size_t i = 0; i < points.x.size(); i += stride_) {
+    if (only && only->data()[i] == 0) continue;
+    const float sigma = points.sigma.data()[i];
+    if (points.status.data()[i] != PixelStatus::ok || times.status.data()[i] != PixelStatus::ok || !(sigma > 0))
+      continue;
+    sightings_.push_back(
+        {{points.x.data()[i], points.y.data()[i], points.z.data()[i]}, times.time.data()[i], 1 / (sigma * sigma)});
+  }
+}
+
+std::optional<LightSweep> LightCalibration::fit() const {
+  std::vector<Crossing> crossings;
+  for (const Sighting& s : sightings_) crossings.push_back({s.point.cast<double>(), s.time, s.weight});
+  if (crossings.size() < 1000) return std::nullopt;
+  const auto [begin, end] = std::ranges::minmax(crossings, {}, &Crossing::time);
   if (!(end.time - begin.time >= 10)) return std::nullopt;
-  const Eigen::Vector3d along = sweep_direction(sightings);
-  SweepFit fit(sightings, begin.time, end.time, along);
+  const Eigen::Vector3d along = sweep_direction(crossings);
+  SweepFit fit(std::move(crossings), begin.time, end.time, along);
   fit.solve();
   return fit.describe();
+}
+
+std::optional<LightSweep> calibrate_light(std::span<const PointMap> points, std::span<const TimeMap> times) {
+  if (points.size() != times.size()) throw std::invalid_argument("calibrate_light: as many points as times, please");
+  std::size_t pixels = 0;
+  for (const PointMap& map : points) pixels += map.x.size();
+  LightCalibration calibration(pixels);
+  for (std::size_t c = 0; c < points.size(); ++c) calibration.add(points[c], times[c]);
+  return calibration.fit();
 }
 
 }  // namespace pagesweep

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "pagesweep/camera/light.h"
+#include "pagesweep/data/pixel_set.h"
 #include "pagesweep/data/point_map.h"
 #include "pagesweep/data/time_map.h"
 
@@ -25,7 +28,29 @@ struct LightSweep {
 /// over the table, f across it, a and b straight lines in time (the sheet may turn evenly) and d a cubic B-spline with
 /// a knot every four frames (a motor is not even). Robust, weighted by the points' sigma; the tilt b, which flat paper
 /// does not show, is held near upright where nothing speaks against it. See docs/derivations/fusion.md.
-/// \return nothing if there are fewer than 1000 points or they cover fewer than ten frames
+class LightCalibration {
+ public:
+  /// \param pixels  of all cameras together
+  explicit LightCalibration(std::size_t pixels);
+
+  /// Some of these points will take part.
+  /// \param only  null: all
+  /// \throws std::invalid_argument  if points and times differ in size
+  void add(const PointMap& points, const TimeMap& times, const PixelSet* only = nullptr);
+  /// The fit to all points so far; nothing if there are fewer than 1000 or they cover fewer than ten frames.
+  std::optional<LightSweep> fit() const;
+
+ private:
+  struct Sighting {
+    Eigen::Vector3f point;  ///< [mm] rig frame
+    float time;             ///< [frames]
+    float weight;           ///< [1/mm^2]
+  };
+  std::size_t stride_;  ///< [pixels]
+  std::vector<Sighting> sightings_;
+};
+
+/// The fit to all points of all cameras.
 /// \throws std::invalid_argument  if points and times differ in number or size
 std::optional<LightSweep> calibrate_light(std::span<const PointMap> points, std::span<const TimeMap> times);
 

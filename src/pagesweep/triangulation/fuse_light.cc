@@ -20,12 +20,12 @@ namespace {
 /// pixels beside bright ones seem to say is the bright ones' stray light.
 class Lateness {
  public:
-  Lateness(const PointMap& points, const TimeMap& times, const Light& light)
+  Lateness(const PointMap& points, const TimeMap& times, const Light& light, const PixelSet* stereo)
       : tiles_((times.width() + tile - 1) / tile, (times.height() + tile - 1) / tile) {
     parallel_rows(tiles_.height(), [&](int row) {
       std::vector<Voice> voices;
       for (int column = 0; column < tiles_.width(); ++column) {
-        gather(points, times, light, column, row, voices);
+        gather(points, times, light, stereo, column, row, voices);
         tiles_(column, row) = weighted_median(voices);
       }
     });
@@ -62,13 +62,13 @@ class Lateness {
     float weight = 0;  ///< [1/frames^2]
   };
 
-  static void gather(const PointMap& points, const TimeMap& times, const Light& light, int column, int row,
-                     std::vector<Voice>& voices) {
+  static void gather(const PointMap& points, const TimeMap& times, const Light& light, const PixelSet* stereo,
+                     int column, int row, std::vector<Voice>& voices) {
     voices.clear();
     const int right = std::min((column + 1) * tile, times.width()), bottom = std::min((row + 1) * tile, times.height());
     for (int y = row * tile; y < bottom; ++y)
       for (int x = column * tile; x < right; ++x) {
-        if (points.status(x, y) != PixelStatus::ok) continue;
+        if (!takes_part(stereo, x, y) || points.status(x, y) != PixelStatus::ok) continue;
         const auto time = light.time_of({points.x(x, y), points.y(x, y), points.z(x, y)});
         if (time)
           voices.push_back({static_cast<float>(times.time(x, y) - *time), 1 / (times.sigma(x, y) * times.sigma(x, y))});
@@ -138,7 +138,7 @@ bool may_be_sectioned(PixelStatus status) {
 class Fusion {
  public:
   Fusion(const PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
-         const Camera& to, const Light& light, const TriangulationOptions& options)
+         const Camera& to, const Light& light, const TriangulationOptions& options, const PixelSet* stereo)
       : matches_(matches),
         times_(times),
         rays_(camera),
@@ -146,7 +146,7 @@ class Fusion {
         to_(to),
         light_(light),
         options_(options),
-        lateness_(points, times, light) {}
+        lateness_(points, times, light, stereo) {}
 
   void put(PointMap& points, int x, int y, Neighbourhood& around, FusionCounts& counts) const {
     const bool matched = points.status(x, y) == PixelStatus::ok;
@@ -225,24 +225,29 @@ class Fusion {
 
 }  // namespace
 
+FusionCounts& FusionCounts::operator+=(const FusionCounts& more) {
+  weighted += more.weighted;
+  corrected += more.corrected;
+  added += more.added;
+  return *this;
+}
+
 FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
-                        const RayTable& to, const Light& light, const TriangulationOptions& options) {
+                        const RayTable& to, const Light& light, const TriangulationOptions& options,
+                        const PixelSet* only, const PixelSet* stereo) {
   const auto fits = [&](int width, int height) { return width == camera.width() && height == camera.height(); };
   if (!fits(points.width(), points.height()) || !fits(matches.width(), matches.height()) ||
       !fits(times.width(), times.height()))
     throw std::invalid_argument("fuse_light: points, matches or times are not of the camera's size");
-  const Fusion fusion(points, matches, times, camera, to.camera(), light, options);
+  const Fusion fusion(points, matches, times, camera, to.camera(), light, options, stereo);
   std::vector<FusionCounts> rows(static_cast<std::size_t>(camera.height()));
   parallel_rows(camera.height(), [&](int y) {
     Neighbourhood around;
-    for (int x = 0; x < camera.width(); ++x) fusion.put(points, x, y, around, rows[static_cast<std::size_t>(y)]);
+    for (int x = 0; x < camera.width(); ++x)
+      if (takes_part(only, x, y)) fusion.put(points, x, y, around, rows[static_cast<std::size_t>(y)]);
   });
   FusionCounts all;
-  for (const FusionCounts& row : rows) {
-    all.weighted += row.weighted;
-    all.corrected += row.corrected;
-    all.added += row.added;
-  }
+  for (const FusionCounts& row : rows) all += row;
   return all;
 }
 

@@ -5,6 +5,7 @@
 
 #include "pagesweep/camera/light.h"
 #include "pagesweep/data/correspondences.h"
+#include "pagesweep/data/pixel_set.h"
 #include "pagesweep/data/point_map.h"
 #include "pagesweep/data/time_map.h"
 #include "pagesweep/triangulation/triangulate.h"
@@ -16,6 +17,8 @@ struct FusionCounts {
   std::int64_t weighted = 0;   ///< both cameras and the sheet agree
   std::int64_t corrected = 0;  ///< the sheet contradicts the match: the pixel's own time and the sheet count
   std::int64_t added = 0;      ///< the other camera does not see the spot, or no match was found
+
+  FusionCounts& operator+=(const FusionCounts& more);
 };
 
 /// Makes each stereo point the weighted mean of what both cameras and the sheet of light say, and measures by light
@@ -28,8 +31,11 @@ struct FusionCounts {
 /// See docs/derivations/fusion.md. Normals are left to fit_normals().
 /// \param points   of `camera`, from triangulate() with these `matches` and `times`; changed
 /// \param to       the camera that the matches are in
+/// \param only     pixels that it is done for; null: all
+/// \param stereo   points that are as triangulate() left them, those around `only` among them; null: all
 /// \throws std::invalid_argument  if sizes differ
 FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
-                        const RayTable& to, const Light& light, const TriangulationOptions& options = {});
+                        const RayTable& to, const Light& light, const TriangulationOptions& options = {},
+                        const PixelSet* only = nullptr, const PixelSet* stereo = nullptr);
 
 }  // namespace pagesweep

@@ -47,13 +47,13 @@ void reject(PointMap& points, int x, int y) {
 
 }  // namespace
 
-void fit_normals(PointMap& points, const RayTable& camera, int radius_px) {
+void fit_normals(PointMap& points, const RayTable& camera, int radius_px, const PixelSet* only) {
   const Image<float> inverse_depth = inverse_depths(points, camera.camera());
   const Eigen::Matrix3f rig_from_cam = camera.camera().cam_from_rig.rotation.transpose().cast<float>();
   parallel_rows(points.height(), [&](int y) {
     Neighbourhood around;
     for (int x = 0; x < points.width(); ++x) {
-      if (points.status(x, y) != PixelStatus::ok) continue;
+      if (points.status(x, y) != PixelStatus::ok || !takes_part(only, x, y)) continue;
       around.gather(inverse_depth, x, y, radius_px);
       auto plane = around.fit();
       if (!plane) {

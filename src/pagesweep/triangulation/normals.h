@@ -2,6 +2,7 @@
 #pragma once
 
 #include "pagesweep/camera/ray_table.h"
+#include "pagesweep/data/pixel_set.h"
 #include "pagesweep/data/point_map.h"
 
 namespace pagesweep {
@@ -14,6 +15,7 @@ namespace pagesweep {
 /// more than three times the median do not count in a second fit: another surface behind an edge. A point is off the
 /// surface if fewer than six neighbours have points, or if it misses the plane by more than six of its own standard
 /// deviations and six times the median.
-void fit_normals(PointMap& points, const RayTable& camera, int radius_px = 3);
+/// \param only  points that get one; null: all
+void fit_normals(PointMap& points, const RayTable& camera, int radius_px = 3, const PixelSet* only = nullptr);
 
 }  // namespace pagesweep

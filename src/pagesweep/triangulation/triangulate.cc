@@ -78,19 +78,25 @@ class Triangulator {
 
 }  // namespace
 
+void triangulate(const Correspondences& matches, const RayTable& from, const RayTable& to,
+                 const TriangulationOptions& options, PointMap& points, const PixelSet* only) {
+  const auto fits = [&](const auto& map) { return map.width() == from.width() && map.height() == from.height(); };
+  if (!fits(matches) || !fits(points))
+    throw std::invalid_argument("triangulate: matches or points are not of the camera's size");
+  const Triangulator triangulator(from, to, options);
+  parallel_rows(from.height(), [&](int y) {
+    for (int x = 0; x < from.width(); ++x)
+      if (takes_part(only, x, y)) triangulator.put(matches, x, y, points);
+  });
+}
+
 PointMap triangulate(const Correspondences& matches, const Image<float>& intensity, const RayTable& from,
                      const RayTable& to, const TriangulationOptions& options) {
-  const auto fits = [&](int width, int height) { return width == from.width() && height == from.height(); };
-  if (!fits(matches.width(), matches.height()))
-    throw std::invalid_argument("triangulate: the matches are not of the camera's size");
-  if (!intensity.empty() && !fits(intensity.width(), intensity.height()))
+  if (!intensity.empty() && (intensity.width() != from.width() || intensity.height() != from.height()))
     throw std::invalid_argument("triangulate: the intensity is not of the camera's size");
-  const Triangulator triangulator(from, to, options);
   PointMap points(from.width(), from.height());
+  triangulate(matches, from, to, options, points, nullptr);
   if (!intensity.empty()) points.intensity = intensity;
-  parallel_rows(from.height(), [&](int y) {
-    for (int x = 0; x < from.width(); ++x) triangulator.put(matches, x, y, points);
-  });
   return points;
 }
 

@@ -4,6 +4,7 @@
 #include "pagesweep/base/image.h"
 #include "pagesweep/camera/ray_table.h"
 #include "pagesweep/data/correspondences.h"
+#include "pagesweep/data/pixel_set.h"
 #include "pagesweep/data/point_map.h"
 
 namespace pagesweep {
@@ -34,5 +35,10 @@ struct TriangulationOptions {
 /// \throws std::invalid_argument  if matches or intensity are not of `from`'s size
 PointMap triangulate(const Correspondences& matches, const Image<float>& intensity, const RayTable& from,
                      const RayTable& to, const TriangulationOptions& options = {});
+
+/// The same for some pixels, whose points and status it enters. Intensities are left alone.
+/// \param only  null: all
+void triangulate(const Correspondences& matches, const RayTable& from, const RayTable& to,
+                 const TriangulationOptions& options, PointMap& points, const PixelSet* only);
 
 }  // namespace pagesweep
