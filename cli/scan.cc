@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // pagesweep scan: the whole way, from a capture to flat pages.
+#include <optional>
+
 #include "cli/capture_input.h"
 #include "cli/command.h"
 #include "cli/console_progress.h"
@@ -26,8 +28,13 @@ void run(const Arguments& arguments) {
   ConsoleProgress progress(arguments.common.quiet);
   OutputFolder output(arguments.output, "report.json");
   const OpenedCapture opened = open(arguments.input);
-  const Picture picture = read_picture(arguments.input.picture_of(opened.capture));
-  const Scan scan = scan_page(*opened.frames, picture, opened.rig, arguments.options, progress);
+  const std::filesystem::path picture_file = arguments.input.picture_of(opened.capture);
+  std::optional<Picture> picture;
+  const auto read = [&]() -> const Picture& {
+    if (!picture) picture = read_picture(picture_file);
+    return *picture;
+  };
+  const Scan scan = scan_page(*opened.frames, ScanSource(read), opened.rig, arguments.options, progress);
 
   progress.begin("writing the pages");
   output.begin();
@@ -38,7 +45,7 @@ void run(const Arguments& arguments) {
                    .measurement = scan.measurement,
                    .surfaces = scan.surfaces,
                    .pages = scan.pages,
-                   .scan = &picture};
+                   .scan = &read()};
   add_measuring_options(result.options, arguments.options);
   add_flattening_options(result.options, arguments.options);
   finish_result(output, result, progress, arguments.common);

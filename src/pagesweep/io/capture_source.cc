@@ -20,7 +20,7 @@ namespace {
 
 /// Instants that are read together: enough work for all threads. As many again may wait to be fetched, which is little
 /// enough memory to be nobody's worry.
-constexpr int instants_together = 8;
+constexpr int instants_together = 4;
 
 int depth_of(const GrayImage& image) { return image.index() == 0 ? 8 : 16; }
 

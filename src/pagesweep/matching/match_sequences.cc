@@ -238,7 +238,7 @@ void SequenceFinder::find_run(int x, int y, const EpipolarGeometry& geometry, st
     if (matches[k].status == PixelStatus::ok) matches[k] = *seekers_[seeker[k]].verdict;
 }
 
-class SequenceMatcher final : public Matcher {
+class SequenceMatcher final : public PixelMatcher {
  public:
   SequenceMatcher(const SequenceStore& from, const SequenceStore& to, const MatchOptions& options)
       : from_(from), to_(to), options_(options) {}

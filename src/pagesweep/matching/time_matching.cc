@@ -183,9 +183,10 @@ class TimeFinder final : public MatchFinder {
   CurveBatch batch_{};
 };
 
-class TimeMatcher final : public Matcher {
+class TimeMatcher final : public PixelMatcher {
  public:
-  TimeMatcher(const TimeMap& from, const SearchedMap& to, const PixelSet* only) : Matcher(only), from_(from), to_(to) {}
+  TimeMatcher(const TimeMap& from, const SearchedMap& to, const PixelSet* only)
+      : PixelMatcher(only), from_(from), to_(to) {}
 
   PixelStatus status_of(int x, int y) const override { return from_.status(x, y); }
   std::unique_ptr<MatchFinder> make_finder() const override { return std::make_unique<TimeFinder>(from_, to_); }

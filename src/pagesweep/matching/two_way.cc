@@ -17,7 +17,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-Match find(const Matcher& matcher, const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y,
+Match find(const PixelMatcher& matcher, const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y,
            double expected) {
   const PixelStatus status = matcher.status_of(x, y);
   if (status != PixelStatus::ok) return Match::none(status);
@@ -56,7 +56,7 @@ constexpr int rows_at_once = 16;
 struct TwoWayMatching::Direction {
   const RayTable* from;
   const RayTable* to;
-  const Matcher* matcher;
+  const PixelMatcher* matcher;
   EpipolarGeometry everywhere{*from, *to, {0, 0}};
 
   EpipolarGeometry geometry(InverseDepthRange range) const { return everywhere.within(range); }
@@ -73,7 +73,7 @@ void put(const Match& match, int x, int y, Correspondences& matches) {
   matches.slope(x, y) = static_cast<float>(match.slope);
 }
 
-void Matcher::match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const {
+void PixelMatcher::match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const {
   const auto finder = make_finder();
   const auto rows = static_cast<std::size_t>(bottom - top);
   std::array<double, rows_at_once> expected;
@@ -163,7 +163,7 @@ TwoWayMatching::TwoWayMatching(const RayTable& first, const RayTable& second, co
       pair_{Correspondences(first.width(), first.height()), Correspondences(second.width(), second.height())},
       found_{pair_.from_first.status, pair_.from_second.status} {}
 
-void TwoWayMatching::match(const Matcher& from_first, const Matcher& from_second, Progress& progress) {
+void TwoWayMatching::match(const PixelMatcher& from_first, const PixelMatcher& from_second, Progress& progress) {
   const Direction there{&first_, &second_, &from_first}, back{&second_, &first_, &from_second};
   progress.begin("looking for the range of depths");
   const DepthRanges ranges = range_is_known_ ? DepthRanges{allowed_, allowed_} : find_ranges(there, back);
@@ -189,8 +189,8 @@ MatchPair TwoWayMatching::matches() && {
   return std::move(pair_);
 }
 
-MatchPair match_both_ways(const RayTable& first, const RayTable& second, const Matcher& from_first,
-                          const Matcher& from_second, const MatchOptions& options, Progress& progress) {
+MatchPair match_both_ways(const RayTable& first, const RayTable& second, const PixelMatcher& from_first,
+                          const PixelMatcher& from_second, const MatchOptions& options, Progress& progress) {
   TwoWayMatching matching(first, second, options);
   matching.match(from_first, from_second, progress);
   matching.keep_agreeing({});

@@ -41,11 +41,11 @@ class MatchFinder {
 };
 
 /// One camera's pixels as they can be matched with the other's: what the two matchers differ in.
-class Matcher {
+class PixelMatcher {
  public:
   /// \param only  pixels that are wanted; null: all
-  explicit Matcher(const PixelSet* only = nullptr) : only_(only) {}
-  virtual ~Matcher() = default;
+  explicit PixelMatcher(const PixelSet* only = nullptr) : only_(only) {}
+  virtual ~PixelMatcher() = default;
   bool is_wanted(int x, int y) const { return takes_part(only_, x, y); }
   /// Why the pixel cannot be matched at all; ok if it can.
   virtual PixelStatus status_of(int x, int y) const = 0;
@@ -69,7 +69,7 @@ class TwoWayMatching {
 
   /// Finds matches of the pixels that the matchers want, and the depth ranges first where they are not given: those of
   /// all parts so far.
-  void match(const Matcher& from_first, const Matcher& from_second, Progress& progress);
+  void match(const PixelMatcher& from_first, const PixelMatcher& from_second, Progress& progress);
   /// Keeps what agrees.
   void keep_agreeing(const PixelSets& only) { pagesweep::keep_agreeing(pair_, found_, max_disagreement_px_, only); }
 
@@ -102,7 +102,7 @@ class TwoWayMatching {
 };
 
 /// Matches all pixels both ways and keeps what agrees.
-MatchPair match_both_ways(const RayTable& first, const RayTable& second, const Matcher& from_first,
-                          const Matcher& from_second, const MatchOptions& options, Progress& progress);
+MatchPair match_both_ways(const RayTable& first, const RayTable& second, const PixelMatcher& from_first,
+                          const PixelMatcher& from_second, const MatchOptions& options, Progress& progress);
 
 }  // namespace pagesweep

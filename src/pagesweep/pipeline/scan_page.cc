@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/camera/ray_table.h"
 #include "pagesweep/footprint/weigh_footprints.h"
 #include "pagesweep/matching/match_sequences.h"
+#include "pagesweep/pipeline/point_stream.h"
 #include "pagesweep/timing/pairwise.h"
 #include "pagesweep/timing/time_stream.h"
 #include "pagesweep/triangulation/normals.h"
@@ -45,7 +47,7 @@ std::vector<Camera> cameras_of(const FrameSource& source, const Rig& rig, Matche
 struct Stage {
   const Rig& rig;
   const ScanOptions& options;
-  const std::vector<Frames>& frames;
+  std::vector<Frames> frames;  ///< where they are needed as a whole
   const std::vector<RayTable> cameras;
 };
 
@@ -94,10 +96,22 @@ void fuse(const MatchPair& matches, const Stage& stage, Measurement& measurement
       fuse_light(measurement.points[1], matches.from_second, times[1], cameras[1], cameras[0], light, options)};
 }
 
+/// Whether points can be found while the stripe is on its way.
+bool follows_stripe(const ScanOptions& options) {
+  return options.matcher == Matcher::time && options.timing.estimator != TimeEstimator::pairwise;
+}
+
+PointStream::Times both(const std::vector<TimeMap>& times) { return {&times[0], &times[1]}; }
+
 /// Points from the time maps; from the frames, for the sequence matcher. They have no normals yet.
 void find_points(const Stage& stage, Measurement& measurement, Progress& progress) {
   if (stage.options.matcher == Matcher::light_section) {
     measurement.points = section_each(stage, measurement);
+    return;
+  }
+  if (follows_stripe(stage.options)) {
+    PointStream points(stage.cameras, stage.options, {.corrects_edges = false, .fits_normals = false});
+    points.finish(both(measurement.timing->maps), measurement, progress);
     return;
   }
   const MatchPair matches = match(stage, measurement, progress);
@@ -156,11 +170,6 @@ double reading_direction(const Scanner& scanner) {
   return rightward ? std::atan2(along_row.y(), along_row.x()) : std::atan2(-along_row.y(), -along_row.x());
 }
 
-/// Whether points need whole sequences, and not only time values.
-bool needs_frames(const ScanOptions& options) {
-  return options.matcher == Matcher::sequence || options.timing.estimator == TimeEstimator::pairwise;
-}
-
 /// All frames first, then what is measured from them.
 std::vector<Frames> read_frames(FrameSource& source, const ScanOptions& options, Measurement& measurement,
                                 Progress& progress) {
@@ -174,12 +183,15 @@ std::vector<Frames> read_frames(FrameSource& source, const ScanOptions& options,
 }
 
 /// Time values while the frames come in; of the frames nothing is kept.
-void follow_frames(FrameSource& source, const ScanOptions& options, Measurement& measurement, Progress& progress) {
+/// \param on_news  called after every instant
+void follow_frames(FrameSource& source, const ScanOptions& options, Measurement& measurement, Progress& progress,
+                   const std::function<void(const TimeStream&)>& on_news) {
   TimeStream times(source.sequences(), options.timing);
-  progress.begin("time values while the frames come in");
+  progress.begin("measuring while the frames come in");
   while (auto set = source.next()) {
     const double part = (set->index + 1.0) / source.sequences()[0].count;
     times.add(*std::move(set));
+    on_news(times);
     progress.advance(part);
   }
   measurement.timing = times.finish(progress);
@@ -189,35 +201,61 @@ void follow_frames(FrameSource& source, const ScanOptions& options, Measurement&
   }
 }
 
+/// Points that follow the stripe as well.
+/// \return the time values as they were seen
+std::vector<TimeMap> follow_stripe(FrameSource& source, const Stage& stage, const PointStream::Steps& steps,
+                                   Measurement& measurement, Progress& progress) {
+  std::optional<PointStream> points;
+  const auto begin = [&] { points.emplace(stage.cameras, stage.options, steps); };
+  follow_frames(source, stage.options, measurement, progress, [&](const TimeStream& times) {
+    const double until = times.known_until();
+    if (!std::isfinite(until)) return;
+    if (!points) begin();
+    points->follow({&times.so_far(0), &times.so_far(1)}, until);
+  });
+  if (!points) begin();
+  std::vector<TimeMap> seen(2);
+  seen.swap(measurement.timing->maps);
+  points->finish(both(seen), measurement, progress);
+  if (!steps.corrects_edges) measurement.timing->maps = seen;
+  return seen;
+}
+
+/// A measurement whose frames, or the light of the rig, must be looked at as a whole.
+std::vector<TimeMap> measure_at_the_end(FrameSource& source, Stage& stage, Measurement& measurement,
+                                        Progress& progress) {
+  const ScanOptions& options = stage.options;
+  if (options.matcher == Matcher::light_section)
+    follow_frames(source, options, measurement, progress, [](const TimeStream&) {});
+  else
+    stage.frames = read_frames(source, options, measurement, progress);
+  std::vector<TimeMap> seen;
+  if (measurement.timing) {
+    seen = measurement.timing->maps;
+    progress.begin("looking for print");
+    if (options.edges != EdgeWitness::none) correct_by_amplitude(seen, measurement);
+  }
+  find_points(stage, measurement, progress);
+  return seen;
+}
+
 }  // namespace
 
 Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& options, Progress& progress,
-                        const Picture* scan) {
+                        const ScanSource& scan) {
   Measurement measurement;
   measurement.cameras = cameras_of(source, rig, options.matcher);
-  std::vector<Frames> frames;
-  if (needs_frames(options))
-    frames = read_frames(source, options, measurement, progress);
-  else
-    follow_frames(source, options, measurement, progress);
-  const Stage stage{rig, options, frames, {measurement.cameras.begin(), measurement.cameras.end()}};
-  if (!measurement.timing) {
-    find_points(stage, measurement, progress);
-    finish_points(stage, measurement);
-    return measurement;
-  }
-  const std::vector<TimeMap> seen = measurement.timing->maps;
-  if (options.edges != EdgeWitness::none) {
-    progress.begin("looking for print");
-    correct_by_amplitude(seen, measurement);
-  }
-  if (options.edges == EdgeWitness::scan && scan && rig.scanner) {
-    find_points(stage, measurement, progress);
+  Stage stage{rig, options, {}, {measurement.cameras.begin(), measurement.cameras.end()}};
+  const bool asks_scan = options.edges == EdgeWitness::scan && scan && rig.scanner;
+  const PointStream::Steps steps{options.edges != EdgeWitness::none, !asks_scan};
+  const std::vector<TimeMap> seen = follows_stripe(options) ? follow_stripe(source, stage, steps, measurement, progress)
+                                                            : measure_at_the_end(source, stage, measurement, progress);
+  if (asks_scan && measurement.timing) {
     progress.begin("looking up the print in the scan");
-    correct_by_scan(seen, *rig.scanner, *scan, measurement);
+    correct_by_scan(seen, *rig.scanner, scan(), measurement);
+    find_points(stage, measurement, progress);
   }
-  find_points(stage, measurement, progress);
-  finish_points(stage, measurement);
+  if (asks_scan || !follows_stripe(options)) finish_points(stage, measurement);
   return measurement;
 }
 
@@ -239,9 +277,15 @@ Scan flatten(Measurement measurement, const Picture& picture, const Rig& rig, co
   return scan;
 }
 
+Scan scan_page(FrameSource& frames, const ScanSource& scan, const Rig& rig, const ScanOptions& options,
+               Progress& progress) {
+  Measurement measurement = reconstruct(frames, rig, options, progress, scan);
+  return flatten(std::move(measurement), scan(), rig, options, progress);
+}
+
 Scan scan_page(FrameSource& frames, const Picture& scan, const Rig& rig, const ScanOptions& options,
                Progress& progress) {
-  return flatten(reconstruct(frames, rig, options, progress, &scan), scan, rig, options, progress);
+  return scan_page(frames, [&]() -> const Picture& { return scan; }, rig, options, progress);
 }
 
 }  // namespace pagesweep

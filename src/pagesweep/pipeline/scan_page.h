@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -88,11 +89,15 @@ struct Scan {
   std::vector<Page> pages;            ///< one a surface
 };
 
+/// Gives the scanner's picture. It is asked when the frames have been measured, as often as it is needed: until then
+/// the scanner may be at work, and nobody needs the memory.
+using ScanSource = std::function<const Picture&()>;
+
 /// The first half of the way: frames to points.
 /// \param scan  the scanner's picture, if there is one: it tells better than the frames what is printed where
 /// \throws Error  (bad_input) if the rig lacks a camera of the source, or what the matcher needs
 Measurement reconstruct(FrameSource& frames, const Rig& rig, const ScanOptions& options = {},
-                        Progress& progress = no_progress(), const Picture* scan = nullptr);
+                        Progress& progress = no_progress(), const ScanSource& scan = {});
 
 /// The second half: points to flat pages.
 /// \throws Error  (bad_input) if the rig has no scanner or the picture is not of its size; (no_result) if no page is
@@ -102,6 +107,8 @@ Scan flatten(Measurement measurement, const Picture& scan, const Rig& rig, const
 
 /// The whole way: frames, time values, correspondences, points, surface, pages.
 Scan scan_page(FrameSource& frames, const Picture& scan, const Rig& rig, const ScanOptions& options = {},
+               Progress& progress = no_progress());
+Scan scan_page(FrameSource& frames, const ScanSource& scan, const Rig& rig, const ScanOptions& options = {},
                Progress& progress = no_progress());
 
 }  // namespace pagesweep

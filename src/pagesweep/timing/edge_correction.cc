@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "pagesweep/base/local_plane.h"
@@ -27,16 +28,23 @@ class Surroundings {
  public:
   Surroundings(const TimeMap& times, const SpotOffsets& offsets) : times_(times), offsets_(offsets) {}
 
-  EdgeComparison look(int x, int y) {
+  /// Nothing if there is nothing to compare.
+  std::optional<EdgeComparison> look(int x, int y) {
     const float dx = offsets_.dx(x, y), dy = offsets_.dy(x, y);
-    if (times_.status(x, y) != PixelStatus::ok || !(std::abs(dx) + std::abs(dy) < largest_offset_px)) return {};
+    if (times_.status(x, y) != PixelStatus::ok || !(std::abs(dx) + std::abs(dy) < largest_offset_px))
+      return std::nullopt;
     const auto [least, most] = frames_a_pixel(x, y);
-    if (std::hypot(dx, dy) * most < least_leaning * times_.sigma(x, y)) return {};
+    if (std::hypot(dx, dy) * most < least_leaning * times_.sigma(x, y)) return std::nullopt;
     around_.gather(times_.time, x, y, radius);
     const auto plane = around_.fit_robustly();
-    if (!plane) return {};
-    return {-plane->middle, dx * plane->across + dy * plane->down, std::hypot(dx, dy), least,
-            is_one_surface(*plane, times_.time, times_.sigma, x, y, radius)};
+    if (!plane) return std::nullopt;
+    return EdgeComparison{x,
+                          y,
+                          -plane->middle,
+                          dx * plane->across + dy * plane->down,
+                          std::hypot(dx, dy),
+                          least,
+                          is_one_surface(*plane, times_.time, times_.sigma, x, y, radius)};
   }
 
  private:
@@ -91,24 +99,26 @@ SpotOffsets offsets_from_amplitude(const TimeMap& times, const PixelSet* only) {
   return offsets;
 }
 
-Image<EdgeComparison> compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets,
-                                                const PixelSet* only) {
+EdgeComparisons compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets, const PixelSet* only) {
   if (times.width() != offsets.width() || times.height() != offsets.height())
     throw std::invalid_argument("edge correction: time map and offsets differ in size");
-  Image<EdgeComparison> comparisons(times.width(), times.height(), EdgeComparison{});
+  std::vector<EdgeComparisons> rows(static_cast<std::size_t>(times.height()));
   parallel_rows(times.height(), [&](int y) {
     Surroundings surroundings(times, offsets);
-    for (int x = 0; x < times.width(); ++x)
-      if (takes_part(only, x, y)) comparisons(x, y) = surroundings.look(x, y);
+    for (int x = 0; x < times.width(); ++x) {
+      if (!takes_part(only, x, y)) continue;
+      if (const auto seen = surroundings.look(x, y)) rows[static_cast<std::size_t>(y)].push_back(*seen);
+    }
   });
-  return comparisons;
+  EdgeComparisons all;
+  for (const EdgeComparisons& row : rows) all.insert(all.end(), row.begin(), row.end());
+  return all;
 }
 
-void EdgeFit::add(const TimeMap& times, const Image<EdgeComparison>& comparisons) {
-  for (std::size_t i = 0; i < comparisons.size(); ++i) {
-    const EdgeComparison& seen = comparisons.data()[i];
+void EdgeFit::add(const TimeMap& times, const EdgeComparisons& comparisons) {
+  for (const EdgeComparison& seen : comparisons) {
     if (!seen.one_surface) continue;
-    const float sigma = times.sigma.data()[i], leaning = seen.leaning / sigma;
+    const float sigma = times.sigma(seen.x, seen.y), leaning = seen.leaning / sigma;
     if (std::abs(leaning) >= least_leaning) edges_.push_back({leaning, seen.misfit / sigma});
   }
 }
@@ -153,24 +163,22 @@ EdgeCorrection EdgeFit::fit() const {
   return correction;
 }
 
-EdgeCorrection fit_edges(const TimeMap& times, const Image<EdgeComparison>& comparisons) {
+EdgeCorrection fit_edges(const TimeMap& times, const EdgeComparisons& comparisons) {
   EdgeFit edges;
   edges.add(times, comparisons);
   return edges.fit();
 }
 
-void correct_edges(TimeMap& times, const Image<EdgeComparison>& comparisons, const EdgeCorrection& correction) {
+void correct_edges(TimeMap& times, const EdgeComparisons& comparisons, const EdgeCorrection& correction) {
   if (!(correction.gain > 0)) return;
-  for (std::size_t i = 0; i < comparisons.size(); ++i) {
-    const EdgeComparison& seen = comparisons.data()[i];
-    if (!std::isfinite(seen.leaning)) continue;
+  for (const EdgeComparison& seen : comparisons) {
     const double shift = correction.gain * seen.leaning;
     // On two surfaces the spot's middle is somewhere in the pixel: evenly distributed over it, at most.
     const double off_px = std::min(correction.gain * seen.offset_px, 1 / std::sqrt(12.0));
     const double doubt = seen.one_surface ? correction.scatter * shift : off_px * seen.pixel;
-    float& sigma = times.sigma.data()[i];
+    float& sigma = times.sigma(seen.x, seen.y);
     sigma = static_cast<float>(std::hypot(sigma, doubt));
-    if (seen.one_surface) times.time.data()[i] -= static_cast<float>(shift);
+    if (seen.one_surface) times.time(seen.x, seen.y) -= static_cast<float>(shift);
   }
 }
 

@@ -17,19 +17,21 @@ SpotOffsets offsets_from_amplitude(const TimeMap& times, const PixelSet* only = 
 
 /// How one pixel's time compares with the plane through those around it.
 struct EdgeComparison {
-  float misfit = not_a_number;   ///< [frames] own time less the plane's; NaN: nothing to compare
-  float leaning = not_a_number;  ///< [frames] offset . gradient of time
-  float offset_px = 0;           ///< length of the offset
-  float pixel = 0;               ///< [frames] that the stripe takes over a pixel of the surface
-  bool one_surface = false;      ///< there is no step in depth nearby
+  int x, y;          ///< the pixel
+  float misfit;      ///< [frames] own time less the plane's
+  float leaning;     ///< [frames] offset . gradient of time
+  float offset_px;   ///< length of the offset
+  float pixel;       ///< [frames] that the stripe takes over a pixel of the surface
+  bool one_surface;  ///< there is no step in depth nearby
 };
+using EdgeComparisons = std::vector<EdgeComparison>;
 
 /// Compares each time value whose offset could matter with the plane through those around it: where offset times
 /// steepness is far below the value's standard deviation, there is nothing to compare.
 /// \throws std::invalid_argument  if the sizes differ
 /// \param only  other pixels are not compared; null: all pixels
-Image<EdgeComparison> compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets,
-                                                const PixelSet* only = nullptr);
+EdgeComparisons compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets,
+                                          const PixelSet* only = nullptr);
 
 /// What a map of time values says about spot offsets.
 struct EdgeCorrection {
@@ -45,7 +47,7 @@ struct EdgeCorrection {
 class EdgeFit {
  public:
   /// \param times  those that were compared
-  void add(const TimeMap& times, const Image<EdgeComparison>& comparisons);
+  void add(const TimeMap& times, const EdgeComparisons& comparisons);
   EdgeCorrection fit() const;
 
  private:
@@ -59,12 +61,12 @@ class EdgeFit {
 };
 
 /// The fit to all pixels that were compared.
-EdgeCorrection fit_edges(const TimeMap& times, const Image<EdgeComparison>& comparisons);
+EdgeCorrection fit_edges(const TimeMap& times, const EdgeComparisons& comparisons);
 
 /// Moves time values from the middles of the spots, where they are true, to the pixels' centres; sigma grows by what
 /// the correction leaves open. At a step in depth, where the spot lies on two surfaces, the time stays and sigma grows
 /// by what the offset may be worth. Pixels without an offset are left alone.
 /// \param times  those that were compared
-void correct_edges(TimeMap& times, const Image<EdgeComparison>& comparisons, const EdgeCorrection& correction);
+void correct_edges(TimeMap& times, const EdgeComparisons& comparisons, const EdgeCorrection& correction);
 
 }  // namespace pagesweep

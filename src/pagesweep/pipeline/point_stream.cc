@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/pipeline/point_stream.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "pagesweep/base/parallel.h"
+#include "pagesweep/triangulation/normals.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// How far each step stays behind the one before, in pixels that the stripe takes to get there: what it looks at around
+// a pixel, and a little more.
+constexpr double to_correct_px = 30;  ///< planes through the times around, and beyond a step in depth
+constexpr double to_match_px = 5;     ///< links between times
+constexpr double to_confirm_px = 3;   ///< matches from the other side
+constexpr double to_fuse_px = 16;     ///< lateness of the light
+constexpr double to_finish_px = 4;    ///< the plane that gives the normal
+/// Fewer at a time, and what all parts together are asked for is asked too often.
+constexpr double part_px = 96;
+
+/// [frames] that the stripe takes from a pixel to the next, where it is slow: it has passed nine of ten pixels faster.
+/// \return 0 if hardly any times are known
+double slowest_passage(const TimeMap& times) {
+  constexpr int stride = 7;
+  std::vector<float> steps;
+  for (int y = 0; y + 1 < times.height(); y += stride)
+    for (int x = 0; x + 1 < times.width(); x += stride) {
+      const float here = times.time(x, y);
+      const float step = std::hypot(times.time(x + 1, y) - here, times.time(x, y + 1) - here);
+      if (std::isfinite(step)) steps.push_back(step);
+    }
+  if (steps.size() < 50) return 0;
+  const auto place = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() * 9 / 10);
+  std::ranges::nth_element(steps, place);
+  return *place;
+}
+
+/// But for the residual.
+void copy_pixel(const TimeMap& from, int x, int y, TimeMap& to) {
+  to.time(x, y) = from.time(x, y);
+  to.sigma(x, y) = from.sigma(x, y);
+  to.amplitude(x, y) = from.amplitude(x, y);
+  to.status(x, y) = from.status(x, y);
+}
+
+}  // namespace
+
+PointStream::PointStream(const std::vector<RayTable>& cameras, const ScanOptions& options, const Steps& steps)
+    : cameras_(cameras),
+      options_(options),
+      steps_(steps),
+      known_until_(-infinity),
+      done_until_(-infinity),
+      matching_(cameras[0], cameras[1], options.matching),
+      calibration_(static_cast<std::size_t>(cameras[0].width()) * static_cast<std::size_t>(cameras[0].height()) +
+                   static_cast<std::size_t>(cameras[1].width()) * static_cast<std::size_t>(cameras[1].height())) {
+  for (std::size_t c = 0; c < sides_.size(); ++c) {
+    const int width = cameras[c].width(), height = cameras[c].height();
+    Side& side = sides_[c];
+    if (steps.corrects_edges) {
+      side.corrected = TimeMap(width, height);
+      side.corrected.residual = {};
+    }
+    side.taken = Image<float>(width, height, not_a_number);
+    side.step = Image<std::uint8_t>(width, height, none);
+    side.now = PixelSet(width, height);
+    side.points = PointMap(width, height);
+    side.points.intensity = {};
+    if (!steps.fits_normals) side.points.nx = side.points.ny = side.points.nz = {};
+  }
+}
+
+void PointStream::follow(const Times& seen, double known_until) {
+  if (!(known_until > known_until_)) return;
+  known_until_ = known_until;
+  frames_a_pixel_ = std::max(slowest_passage(*seen[0]), slowest_passage(*seen[1]));
+  if (!(frames_a_pixel_ > 0) || known_until < done_until_ + part_px * frames_a_pixel_) return;
+  go_on(seen, known_until, no_progress());
+  done_until_ = known_until;
+}
+
+void PointStream::finish(const Times& seen, Measurement& measurement, Progress& progress) {
+  for (std::size_t c = 0; c < sides_.size(); ++c) forget_changed(*seen[c], sides_[c]);
+  go_on(seen, infinity, progress);
+  measurement.points.clear();
+  measurement.fusion.clear();
+  measurement.sweep = sweep_;
+  if (steps_.corrects_edges) measurement.edges.clear();
+  for (std::size_t c = 0; c < sides_.size(); ++c) {
+    Side& side = sides_[c];
+    PointMap& points = side.points;
+    points.intensity = seen[c]->amplitude;
+    if (!steps_.fits_normals)
+      points.nx = points.ny = points.nz = Image<float>(points.width(), points.height(), not_a_number);
+    measurement.points.push_back(std::move(side.points));
+    if (sweep_) measurement.fusion.push_back(side.fusion);
+    if (!steps_.corrects_edges) continue;
+    measurement.edges.push_back(side.correction);
+    side.corrected.residual = seen[c]->residual;
+    measurement.timing->maps[c] = std::move(side.corrected);
+  }
+}
+
+void PointStream::go_on(const Times& seen, double until, Progress& progress) {
+  seen_ = seen;
+  const auto stay_behind = [&](double pixels) { return until -= pixels * frames_a_pixel_; };
+  take_times(seen, stay_behind(to_correct_px));
+  stay_behind(to_match_px);
+  if (step_on(timed, until)) matching_.match(times(0), times(1), now(), progress);
+  locate(stay_behind(to_confirm_px));
+  fuse(stay_behind(to_fuse_px));
+  if (steps_.fits_normals) fit_normals(stay_behind(to_finish_px));
+}
+
+bool PointStream::step_on(Side& side, const TimeMap& times, Step from, double until) {
+  std::vector<std::uint8_t> rows(static_cast<std::size_t>(times.height()));
+  parallel_rows(times.height(), [&](int y) {
+    bool any = false;
+    for (int x = 0; x < times.width(); ++x) {
+      // What has no time comes at the end, where no time is too late.
+      const bool steps_on = side.step(x, y) == from && (until == infinity || times.time(x, y) < until);
+      side.now(x, y) = steps_on;
+      if (steps_on) side.step(x, y) = static_cast<std::uint8_t>(from + 1);
+      any = any || steps_on;
+    }
+    rows[static_cast<std::size_t>(y)] = any;
+  });
+  return std::ranges::find(rows, 1) != rows.end();
+}
+
+bool PointStream::step_on(Step from, double until) {
+  const bool first = step_on(sides_[0], times(0), from, until);
+  const bool second = step_on(sides_[1], times(1), from, until);
+  return first || second;
+}
+
+void PointStream::take_times(const Times& seen, double until) {
+  for (std::size_t c = 0; c < sides_.size(); ++c) {
+    Side& side = sides_[c];
+    if (!step_on(side, *seen[c], none, until)) continue;
+    parallel_rows(side.now.height(), [&](int y) {
+      for (int x = 0; x < side.now.width(); ++x)
+        if (side.now(x, y)) side.taken(x, y) = seen[c]->time(x, y);
+    });
+    if (steps_.corrects_edges) correct(*seen[c], side);
+  }
+}
+
+void PointStream::correct(const TimeMap& seen, Side& side) {
+  parallel_rows(side.now.height(), [&](int y) {
+    for (int x = 0; x < side.now.width(); ++x)
+      if (side.now(x, y)) copy_pixel(seen, x, y, side.corrected);
+  });
+  const auto comparisons = compare_with_surroundings(seen, offsets_from_amplitude(seen, &side.now), &side.now);
+  side.edges.add(seen, comparisons);
+  side.correction = side.edges.fit();
+  correct_edges(side.corrected, comparisons, side.correction);
+}
+
+void PointStream::locate(double until) {
+  if (!step_on(matched, until)) return;
+  matching_.keep_agreeing(now());
+  const MatchPair& matches = matching_.matches();
+  triangulate(matches.from_first, cameras_[0], cameras_[1], options_.triangulation, sides_[0].points, &sides_[0].now);
+  triangulate(matches.from_second, cameras_[1], cameras_[0], options_.triangulation, sides_[1].points, &sides_[1].now);
+  for (std::size_t c = 0; c < sides_.size(); ++c) calibration_.add(sides_[c].points, times(c), &sides_[c].now);
+}
+
+void PointStream::fuse(double until) {
+  if (options_.fusion) sweep_ = calibration_.fit();
+  // Without the sheet of light, points wait for it until the end.
+  if (options_.fusion && !sweep_ && until < infinity) return;
+  std::array<PixelSet, 2> stereo;
+  for (std::size_t c = 0; c < sides_.size(); ++c) {
+    const Side& side = sides_[c];
+    stereo[c] = PixelSet(side.now.width(), side.now.height());
+    for (std::size_t i = 0; i < side.step.size(); ++i) stereo[c].data()[i] = side.step.data()[i] == located;
+  }
+  if (!step_on(located, until) || !sweep_) return;
+  const MatchPair& matches = matching_.matches();
+  for (std::size_t c = 0; c < sides_.size(); ++c)
+    sides_[c].fusion +=
+        fuse_light(sides_[c].points, c == 0 ? matches.from_first : matches.from_second, times(c), cameras_[c],
+                   cameras_[1 - c], sweep_->light, options_.triangulation, &sides_[c].now, &stereo[c]);
+}
+
+void PointStream::fit_normals(double until) {
+  if (!step_on(fused, until)) return;
+  for (std::size_t c = 0; c < sides_.size(); ++c)
+    pagesweep::fit_normals(sides_[c].points, cameras_[c], options_.triangulation.normal_radius_px, &sides_[c].now);
+}
+
+void PointStream::forget_changed(const TimeMap& seen, Side& side) {
+  parallel_rows(side.step.height(), [&](int y) {
+    for (int x = 0; x < side.step.width(); ++x) {
+      // Less than that of a standard deviation is worth nothing.
+      constexpr float little = 0.1f;
+      const float change = std::abs(seen.time(x, y) - side.taken(x, y));
+      if (side.step(x, y) == none || change < little * seen.sigma(x, y)) continue;
+      side.step(x, y) = none;
+      PointMap& points = side.points;
+      points.x(x, y) = points.y(x, y) = points.z(x, y) = points.sigma(x, y) = not_a_number;
+      if (steps_.fits_normals) points.nx(x, y) = points.ny(x, y) = points.nz(x, y) = not_a_number;
+      points.status(x, y) = PixelStatus::not_computed;
+    }
+  });
+}
+
+}  // namespace pagesweep
