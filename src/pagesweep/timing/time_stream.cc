@@ -47,7 +47,9 @@ void TimeStream::add(FrameSet set) {
   if (!follows_) return;
   const int end = set.index + 1;
   while (!learned_ && next_lesson_ <= end) learn(std::exchange(next_lesson_, next_lesson(next_lesson_)));
-  if (learned_ && end - looked_at_ >= frames_a_step) follow(end);
+  if (!learned_ || end - looked_at_ < frames_a_step) return;
+  for (std::size_t c = 0; c < frames_.size(); ++c) look(c, end);
+  looked_at_ = end;
 }
 
 void TimeStream::learn(int end) {
@@ -56,7 +58,12 @@ void TimeStream::learn(int end) {
   auto stripe = learn_stripe_early(frames_, end);
   if (!stripe) return;
   learned_ = std::make_unique<Learned>(Learned{*std::move(stripe), {}});
-  for (std::size_t c = 0; c < frames_.size(); ++c) follow_camera(c);
+  // One camera's frames make room for the next one's windows.
+  for (std::size_t c = 0; c < frames_.size(); ++c) {
+    follow_camera(c);
+    look(c, end);
+  }
+  looked_at_ = end;
 }
 
 void TimeStream::follow_camera(std::size_t c) {
@@ -64,17 +71,14 @@ void TimeStream::follow_camera(std::size_t c) {
   learned_->cameras.emplace_back(std::in_place, frames_[c].sequence(), stripe.profile, stripe.noise[c], options_);
 }
 
-void TimeStream::follow(int end) {
-  for (std::size_t c = 0; c < frames_.size(); ++c) {
-    RecordedTimes& times = *learned_->cameras[c];
-    Frames& frames = frames_[c];
-    times.look(frames, std::min(end, frames.count()));
-    // The last frame before what is needed may stand for a dropped one.
-    int kept = times.first_needed();
-    while (kept > 0 && !frames.has(kept)) --kept;
-    for (int i = 0; i < kept; ++i) frames.forget(i);
-  }
-  looked_at_ = end;
+void TimeStream::look(std::size_t c, int end) {
+  RecordedTimes& times = *learned_->cameras[c];
+  Frames& frames = frames_[c];
+  times.look(frames, std::min(end, frames.count()));
+  // The last frame before what is needed may stand for a dropped one.
+  int kept = times.first_needed();
+  while (kept > 0 && !frames.has(kept)) --kept;
+  for (int i = 0; i < kept; ++i) frames.forget(i);
 }
 
 double TimeStream::known_until() const {

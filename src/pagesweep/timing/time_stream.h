@@ -50,7 +50,7 @@ class TimeStream {
   struct Learned;
   void learn(int end);
   void follow_camera(std::size_t c);
-  void follow(int end);
+  void look(std::size_t c, int end);
 
   TimingOptions options_;
   bool follows_ = false;  ///< else all frames are kept
