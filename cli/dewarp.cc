@@ -23,6 +23,7 @@ struct Arguments {
 };
 
 void run(const Arguments& arguments) {
+  check(arguments.files);
   const ThreadLimit limit(arguments.common.threads);
   ConsoleProgress progress(arguments.common.quiet);
   OutputFolder output(arguments.output, "report.json");
@@ -36,7 +37,8 @@ void run(const Arguments& arguments) {
 
   progress.begin("writing the pages");
   output.begin();
-  write_pages(output.path(), scan.pages, scan.surfaces, arguments.files);
+  write_pages(output.path(), scan.pages, scan.surfaces, arguments.files,
+              {title_of(capture), "pagesweep " PAGESWEEP_VERSION});
   RunResult result{.title = title_of(capture),
                    .sequences = {},
                    .measurement = scan.measurement,

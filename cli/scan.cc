@@ -24,6 +24,7 @@ struct Arguments {
 };
 
 void run(const Arguments& arguments) {
+  check(arguments.files);
   const ThreadLimit limit(arguments.common.threads);
   ConsoleProgress progress(arguments.common.quiet);
   OutputFolder output(arguments.output, "report.json");
@@ -39,7 +40,8 @@ void run(const Arguments& arguments) {
   progress.begin("writing the pages");
   output.begin();
   write_measurement(output.path(), scan.measurement);
-  write_pages(output.path(), scan.pages, scan.surfaces, arguments.files);
+  write_pages(output.path(), scan.pages, scan.surfaces, arguments.files,
+              {title_of(opened.capture), "pagesweep " PAGESWEEP_VERSION});
   RunResult result{.title = title_of(opened.capture),
                    .sequences = opened.frames->sequences(),
                    .measurement = scan.measurement,

@@ -15,6 +15,7 @@ find_package(Ceres REQUIRED)
 find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc calib3d features2d aruco)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(vips REQUIRED IMPORTED_TARGET vips-cpp)
+pkg_check_modules(openjpeg REQUIRED IMPORTED_TARGET libopenjp2)
 pkg_check_modules(pangocairo REQUIRED IMPORTED_TARGET pangocairo)
 
 if(PAGESWEEP_BUILD_TESTS)

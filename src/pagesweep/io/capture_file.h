@@ -55,8 +55,8 @@ void write_capture(const Capture& capture);
 /// The rig that a capture names.
 Rig read_capture_rig(const Capture& capture);
 
-/// Cameras of which only names and sizes are known, from the frames themselves: enough to open a capture that has no rig
-/// yet.
+/// Cameras of which only names and sizes are known, from the frames themselves: enough to open a capture that has no
+/// rig yet.
 /// \throws Error  if the frames cannot be read
 Rig read_camera_sizes(const Capture& capture);
 

@@ -10,6 +10,16 @@ namespace {
 
 constexpr std::size_t box_header = 8;  // length, including itself, and type
 constexpr char icc_method = 2;         // of a colour specification
+constexpr std::string_view xmp_uuid("\xBE\x7A\xCF\xCB\x97\xA9\x42\xE8\x9C\x71\x99\x94\x91\xE3\xAF\xAC", 16);
+
+std::string text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+std::vector<std::byte> bytes_of(std::string_view text) {
+  const auto* begin = reinterpret_cast<const std::byte*>(text.data());
+  return {begin, begin + text.size()};
+}
 
 std::uint32_t big_endian(std::string_view bytes, std::size_t at, int count) {
   std::uint32_t value = 0;
@@ -75,18 +85,20 @@ std::string resolution_box(double pixels_per_mm) {
 
 }  // namespace
 
-std::string complete_jp2_header(std::string jp2, double pixels_per_mm, std::span<const std::byte> icc_profile) {
+std::string complete_jp2_header(std::string jp2, double pixels_per_mm, std::span<const std::byte> icc_profile,
+                                std::span<const std::byte> xmp) {
   const auto header = find_box(jp2, "jp2h");
   if (!header) return jp2;
   std::string content(header->content);
   if (!icc_profile.empty()) {
     if (const auto color = find_box(content, "colr")) content.erase(color->begin, box_header + color->content.size());
     const std::string method_precedence_approximation = {icc_method, 0, 0};
-    content += box("colr", method_precedence_approximation +
-                               std::string(reinterpret_cast<const char*>(icc_profile.data()), icc_profile.size()));
+    content += box("colr", method_precedence_approximation + text_of(icc_profile));
   }
   if (pixels_per_mm > 1e-3 && pixels_per_mm < 1e6) content += resolution_box(pixels_per_mm);
-  return jp2.replace(header->begin, box_header + header->content.size(), box("jp2h", content));
+  std::string boxes = box("jp2h", content);
+  if (!xmp.empty()) boxes += box("uuid", std::string(xmp_uuid) + text_of(xmp));
+  return jp2.replace(header->begin, box_header + header->content.size(), boxes);
 }
 
 Jp2Header read_jp2_header(std::string_view jp2) {
@@ -95,7 +107,9 @@ Jp2Header read_jp2_header(std::string_view jp2) {
   if (!header) return found;
   const auto color = find_box(header->content, "colr");
   if (color && color->content.size() > 3 && color->content[0] == icc_method)
-    for (const char byte : color->content.substr(3)) found.icc_profile.push_back(static_cast<std::byte>(byte));
+    found.icc_profile = bytes_of(color->content.substr(3));
+  const auto uuid = find_box(jp2, "uuid");
+  if (uuid && uuid->content.starts_with(xmp_uuid)) found.xmp = bytes_of(uuid->content.substr(xmp_uuid.size()));
   const auto resolution = find_box(header->content, "res ");
   if (!resolution) return found;
   auto values = find_box(resolution->content, "resc");

@@ -10,8 +10,11 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/io/atomic_file.h"
+#include "pagesweep/io/image_codecs.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/jp2_header_internal.h"
+#include "pagesweep/io/jp2_writer_internal.h"
+#include "pagesweep/io/tiff_writer_internal.h"
 
 namespace pagesweep {
 namespace {
@@ -133,6 +136,7 @@ void add_jp2_header(Picture& picture, const std::filesystem::path& file) {
   const auto header = read_jp2_header(std::string_view(start).substr(0, static_cast<std::size_t>(stream.gcount())));
   picture.pixels_per_mm = header.pixels_per_mm;
   picture.icc_profile = header.icc_profile;
+  if (!header.xmp.empty()) picture.metadata["xmp"] = header.xmp;
 }
 
 Picture read_with_vips(const std::filesystem::path& file) {
@@ -149,6 +153,8 @@ Picture read_with_vips(const std::filesystem::path& file) {
     if (auto blob = blob_of(image, kind.vips_name); !blob.empty()) picture.metadata[kind.name] = std::move(blob);
   picture.pixels_per_mm = resolution_of(image);
   if (std::string_view(image.get_string("vips-loader")) == "jp2kload") add_jp2_header(picture, file);
+  if (std::string_view(image.get_string("vips-loader")) == "tiffload" && !picture.metadata.contains("exif"))
+    if (auto exif = read_tiff_tags(file); !exif.empty()) picture.metadata["exif"] = std::move(exif);
   image = to_gray_or_rgb(image, file);
   picture.channels = image.bands();
   if (image.format() == VIPS_FORMAT_UCHAR)
@@ -182,17 +188,6 @@ VImage to_vips(const Picture& picture) {
   return image;
 }
 
-VipsForeignTiffCompression compression_of(TiffCompression compression) {
-  switch (compression) {
-    case TiffCompression::none:
-      return VIPS_FOREIGN_TIFF_COMPRESSION_NONE;
-    case TiffCompression::lzw:
-      return VIPS_FOREIGN_TIFF_COMPRESSION_LZW;
-    default:
-      return VIPS_FOREIGN_TIFF_COMPRESSION_DEFLATE;
-  }
-}
-
 std::string lower_case_extension(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
   std::ranges::transform(extension, extension.begin(),
@@ -200,13 +195,13 @@ std::string lower_case_extension(const std::filesystem::path& file) {
   return extension;
 }
 
-std::string pack_jp2(const VImage& image) {
-  VipsBlob* const blob = image.jp2ksave_buffer(VImage::option()->set("lossless", true));
-  std::size_t size = 0;
-  const auto* data = static_cast<const char*>(vips_blob_get(blob, &size));
-  std::string bytes(data, size);
-  vips_area_unref(VIPS_AREA(blob));
-  return bytes;
+std::span<const std::byte> xmp_of(const Picture& picture) {
+  const auto found = picture.metadata.find("xmp");
+  return found == picture.metadata.end() ? std::span<const std::byte>() : found->second;
+}
+
+vips::VOption* jpeg_options(int quality) {
+  return VImage::option()->set("Q", std::clamp(quality, 1, 100))->set("optimize_coding", true);
 }
 
 void save(const VImage& image, const std::filesystem::path& file, const std::string& extension,
@@ -214,15 +209,8 @@ void save(const VImage& image, const std::filesystem::path& file, const std::str
   const char* name = file.c_str();
   if (extension == ".png") {
     image.pngsave(name, VImage::option()->set("compression", 6));
-  } else if (extension == ".tif" || extension == ".tiff") {
-    const bool packed = options.tiff_compression != TiffCompression::none;
-    image.tiffsave(
-        name, VImage::option()
-                  ->set("compression", compression_of(options.tiff_compression))
-                  ->set("predictor", packed ? VIPS_FOREIGN_TIFF_PREDICTOR_HORIZONTAL : VIPS_FOREIGN_TIFF_PREDICTOR_NONE)
-                  ->set("resunit", VIPS_FOREIGN_TIFF_RESUNIT_INCH));
   } else {
-    image.jpegsave(name, VImage::option()->set("Q", std::clamp(options.jpeg_quality, 1, 100)));
+    image.jpegsave(name, jpeg_options(options.jpeg_quality));
   }
 }
 
@@ -251,15 +239,48 @@ void write_picture(const std::filesystem::path& file, const Picture& picture, co
   if (picture.width() == 0 || picture.height() == 0) throw std::invalid_argument("write_picture: the picture is empty");
   try {
     if (extension == ".jp2") {
-      write_bytes(file, complete_jp2_header(pack_jp2(to_vips(picture)), picture.pixels_per_mm, picture.icc_profile));
+      write_bytes(file,
+                  complete_jp2_header(pack_jp2(picture), picture.pixels_per_mm, picture.icc_profile, xmp_of(picture)));
       return;
     }
     AtomicFile output(file);
-    save(to_vips(picture), output.temporary(), extension, options);
+    if (extension.starts_with(".tif"))
+      write_tiff(output.temporary(), picture, options.tiff_compression);
+    else
+      save(to_vips(picture), output.temporary(), extension, options);
     output.commit();
   } catch (const vips::VError& e) {
     throw cannot_write(file, message_of(e));
+  } catch (const Error&) {
+    throw;
+  } catch (const std::runtime_error& e) {  // of the packers, which do not know the file
+    throw cannot_write(file, e.what());
   }
+}
+
+Picture with_8_bit(const Picture& picture) {
+  const auto* fine = std::get_if<Image<std::uint16_t>>(&picture.samples);
+  if (!fine) return picture;
+  Picture result{Image<std::uint8_t>(fine->width(), fine->height()), picture.channels, picture.pixels_per_mm,
+                 picture.icc_profile, picture.metadata};
+  std::ranges::transform(fine->pixels(), std::get<0>(result.samples).data(),
+                         [](std::uint16_t value) { return static_cast<std::uint8_t>((value + 128) / 257); });
+  return result;
+}
+
+std::string encode_jpeg(const Picture& picture, int quality) {
+  start_vips();
+  const Picture bare{with_8_bit(picture).samples, picture.channels, picture.pixels_per_mm, {}, {}};
+  VipsBlob* const blob = to_vips(bare).jpegsave_buffer(jpeg_options(quality)->set("strip", true));
+  std::size_t size = 0;
+  const auto* data = static_cast<const char*>(vips_blob_get(blob, &size));
+  std::string bytes(data, size);
+  vips_area_unref(VIPS_AREA(blob));
+  return bytes;
+}
+
+std::string encode_jp2(const Picture& picture) {
+  return complete_jp2_header(pack_jp2(picture), picture.pixels_per_mm, picture.icc_profile, {});
 }
 
 }  // namespace pagesweep

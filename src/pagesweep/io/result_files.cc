@@ -11,6 +11,7 @@
 #include "pagesweep/base/error.h"
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
+#include "pagesweep/io/pages_file.h"
 
 namespace pagesweep {
 namespace {
@@ -77,14 +78,19 @@ CameraFiles::CameraFiles(const fs::path& folder, const std::string& camera)
 PageFiles::PageFiles(const fs::path& folder, int index)
     : scan_map(folder / fmt::format("page_{}_scanmap.tiff", index)),
       surface(folder / fmt::format("page_{}_surface.tiff", index)),
-      stem(folder / fmt::format("page_{}", index)) {}
+      stem(folder / fmt::format("page_{}", index)) {
+  const auto listed = read_pages_file(folder);
+  for (const PageEntry& page : listed ? listed->pages : std::vector<PageEntry>{})
+    if (page.index == index) named = folder / page.picture;
+}
 
 fs::path PageFiles::picture(std::string_view format) const { return fmt::format("{}.{}", stem.string(), format); }
 
 std::vector<fs::path> PageFiles::pictures() const {
   std::vector<fs::path> there;
+  if (!named.empty() && fs::exists(named)) there.push_back(named);
   for (const char* format : {"png", "tiff", "tif", "jp2", "jpg", "jpeg"})
-    if (fs::exists(picture(format))) there.push_back(picture(format));
+    if (picture(format) != named && fs::exists(picture(format))) there.push_back(picture(format));
   return there;
 }
 

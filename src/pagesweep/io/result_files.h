@@ -23,12 +23,12 @@ struct CameraFiles {
 struct PageFiles {
   PageFiles(const std::filesystem::path& folder, int index);
   std::filesystem::path picture(std::string_view format) const;  ///< \param format  the extension, such as "png"
-  /// The pictures that are there, whatever their format.
+  /// The pictures that are there, whatever their format; a name that pages.json gives is the first.
   std::vector<std::filesystem::path> pictures() const;
   std::filesystem::path scan_map, surface;
 
  private:
-  std::filesystem::path stem;
+  std::filesystem::path stem, named;
 };
 
 /// Numbers of the pages that have a scan map in the folder, in order.

@@ -2,7 +2,12 @@
 #include "pagesweep/pipeline/results.h"
 
 #include "pagesweep/base/error.h"
+#include "pagesweep/io/color_profile.h"
 #include "pagesweep/io/float_tiff.h"
+#include "pagesweep/io/image_codecs.h"
+#include "pagesweep/io/page_metadata.h"
+#include "pagesweep/io/page_name.h"
+#include "pagesweep/io/pages_file.h"
 #include "pagesweep/io/ply_file.h"
 #include "pagesweep/io/result_files.h"
 
@@ -24,6 +29,25 @@ void write_surface(const fs::path& file, const PageSurface& surface) {
   write_float_tiff(file, views);
 }
 
+std::vector<std::string> names_of_pages(const std::vector<int>& indices, const PageFileOptions& options,
+                                        const PageOrigin& origin) {
+  std::vector<PageNaming> naming;
+  for (const int index : indices)
+    naming.push_back(
+        {options.first_page + index - 1, index, side_of(index, static_cast<int>(indices.size())), origin.capture});
+  return PageNamePattern(options.page_name).names(naming);
+}
+
+/// The picture as it goes into its file.
+Picture finished(const Page& page, const PageFileOptions& options, const PageOrigin& origin) {
+  Picture picture = options.format == PageFormat::jpeg ? with_8_bit(page.picture) : page.picture;
+  complete_profile(picture);
+  complete_metadata(picture, {.title = origin.capture + ", page " + std::to_string(page.index),
+                              .source = origin.capture,
+                              .program = origin.program});
+  return picture;
+}
+
 void remove_old_pages(const fs::path& folder) {
   if (!fs::is_directory(folder)) return;
   for (const int index : pages_in(folder)) {
@@ -32,9 +56,12 @@ void remove_old_pages(const fs::path& folder) {
     fs::remove(files.surface);
     fs::remove(files.scan_map);
   }
+  fs::remove(folder / "pages.json");
 }
 
 }  // namespace
+
+void check(const PageFileOptions& options) { names_of_pages({1, 2}, options, {}); }
 
 void write_measurement(const fs::path& folder, const Measurement& measurement) {
   write_ply(folder / "points.ply", measurement.points);
@@ -64,14 +91,21 @@ Measurement read_measurement(const fs::path& folder, const Rig& rig) {
 }
 
 void write_pages(const fs::path& folder, std::span<const Page> pages, std::span<const PageSurface> surfaces,
-                 const PageFileOptions& options) {
+                 const PageFileOptions& options, const PageOrigin& origin) {
+  std::vector<int> indices;
+  for (const Page& page : pages) indices.push_back(page.index);
+  const std::vector<std::string> names = names_of_pages(indices, options, origin);
   remove_old_pages(folder);
+  PagesFile index{origin.capture, {}};
   for (std::size_t i = 0; i < pages.size(); ++i) {
     const PageFiles files(folder, pages[i].index);
     write_scan_map(files.scan_map, pages[i].scan_map);
     write_surface(files.surface, surfaces[i]);
-    write_picture(files.picture(name_of(options.format)), pages[i].picture, options.picture);
+    const std::string name = names[i] + "." + std::string(extension_of(options.format));
+    write_picture(folder / name, finished(pages[i], options, origin), options.picture);
+    index.pages.push_back({pages[i].index, name, side_of(pages[i].index, static_cast<int>(pages.size()))});
   }
+  write_pages_file(folder, index);
 }
 
 }  // namespace pagesweep

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/io/color_profile.h"
 #include "pagesweep/sim/random.h"
-#include "pagesweep/sim/srgb_profile.h"
 
 namespace pagesweep::sim {
 namespace {

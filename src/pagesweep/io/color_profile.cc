@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pagesweep/sim/srgb_profile.h"
+#include "pagesweep/io/color_profile.h"
 
 #include <cmath>
 #include <cstdint>
@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace pagesweep::sim {
+namespace pagesweep {
 namespace {
 
 /// Bytes in the order of an ICC profile: big-endian.
@@ -52,11 +52,17 @@ struct Tag {
   Bytes data;
 };
 
-/// The tags of a matrix profile. Primaries and white are those of sRGB, adapted to D50 by Bradford's matrix.
-std::vector<Tag> make_tags() {
-  Bytes curve;  // parametricCurveType, function 3: ((x + 0.055) / 1.055)^2.4, below 0.04045 x / 12.92
+/// parametricCurveType, function 3: ((x + 0.055) / 1.055)^2.4, below 0.04045 x / 12.92
+Bytes srgb_curve() {
+  Bytes curve;
   curve.text("para").number(0).number(3u << 16);
   for (const double parameter : {2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045}) curve.fixed(parameter);
+  return curve;
+}
+
+/// The tags of a matrix profile. Primaries and white are those of sRGB, adapted to D50 by Bradford's matrix.
+std::vector<Tag> srgb_tags() {
+  const Bytes curve = srgb_curve();
   Bytes adaptation;
   adaptation.text("sf32").number(0);
   for (const double value :
@@ -74,10 +80,15 @@ std::vector<Tag> make_tags() {
           {"chad", adaptation}};
 }
 
-}  // namespace
+std::vector<Tag> gray_tags() {
+  return {{"desc", localized("Gray with the tone curve of sRGB")},
+          {"cprt", localized("No copyright, use freely")},
+          {"wtpt", xyz(0.9642, 1.0, 0.8249)},
+          {"kTRC", srgb_curve()}};
+}
 
-std::vector<std::byte> make_srgb_profile() {
-  const std::vector<Tag> tags = make_tags();
+/// \param space  signature of the device's colours: "RGB ", "GRAY"
+std::vector<std::byte> make_profile(std::string_view space, const std::vector<Tag>& tags) {
   Bytes table, data;
   const std::size_t data_start = 128 + 4 + 12 * tags.size();
   table.number(static_cast<std::uint32_t>(tags.size()));
@@ -87,12 +98,29 @@ std::vector<std::byte> make_srgb_profile() {
     data.append(tag.data).pad(4);
   }
   Bytes profile;
-  profile.number(static_cast<std::uint32_t>(data_start + data.size())).zeros(4).number(0x04300000);
-  profile.text("mntrRGB XYZ ").number(2024u << 16 | 1).number(1u << 16).number(0).text("acsp");
+  profile.number(static_cast<std::uint32_t>(data_start + data.size())).zeros(4).number(0x04200000);
+  profile.text("mntr").text(space).text("XYZ ").number(2024u << 16 | 1).number(1u << 16).number(0).text("acsp");
   profile.zeros(28).fixed(0.9642).fixed(1.0).fixed(0.8249).zeros(48);
   const std::string bytes = profile.append(table).append(data).get();
   const auto span = std::as_bytes(std::span(bytes));
   return {span.begin(), span.end()};
 }
 
-}  // namespace pagesweep::sim
+}  // namespace
+
+std::vector<std::byte> make_srgb_profile() { return make_profile("RGB ", srgb_tags()); }
+
+std::vector<std::byte> make_gray_profile() { return make_profile("GRAY", gray_tags()); }
+
+bool fits_profile(const Picture& picture) {
+  constexpr std::size_t header = 128, space_at = 16;
+  if (picture.icc_profile.size() < header) return false;
+  const std::string_view space(reinterpret_cast<const char*>(picture.icc_profile.data()) + space_at, 4);
+  return space == (picture.channels == 1 ? "GRAY" : "RGB ");
+}
+
+void complete_profile(Picture& picture) {
+  if (!fits_profile(picture)) picture.icc_profile = picture.channels == 1 ? make_gray_profile() : make_srgb_profile();
+}
+
+}  // namespace pagesweep
