@@ -28,6 +28,7 @@ void print_answer(const CommonOptions& options, const nlohmann::ordered_json& js
 void add_scan_command(CLI::App& app);
 void add_reconstruct_command(CLI::App& app);
 void add_dewarp_command(CLI::App& app);
+void add_deliver_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_plan_command(CLI::App& app);

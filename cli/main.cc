@@ -40,6 +40,7 @@ void add_commands(CLI::App& app) {
   add_scan_command(app);
   add_reconstruct_command(app);
   add_dewarp_command(app);
+  add_deliver_command(app);
   add_simulate_command(app);
   add_evaluate_command(app);
   add_plan_command(app);
