@@ -108,7 +108,8 @@ std::string settings_of(const Job& job, const NamedPage& page) {
 
 void write_text(const Job& job, const NamedPage& page, const Picture& picture, std::vector<DeliveredFile>& files) {
   const TextPage text = (*job.read_text)(picture);
-  const std::string image = page.source.picture.filename().string();
+  const std::string image =
+      files.empty() ? page.source.picture.filename().string() : fs::path(files.front().path).filename().string();
   write_bytes(job.folder / page.hocr(), format_hocr(text, {job.title, image, job.read_text->version()}));
   files.push_back(describe(job, "hocr", page.hocr()));
   const fs::path alto = fs::path("alto") / (page.name + ".xml");

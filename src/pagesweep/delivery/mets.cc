@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
 #include <map>
+#include <stdexcept>
+#include <string_view>
 
 #include "pagesweep/delivery/xml_document_internal.h"
 
@@ -49,7 +52,8 @@ class FileSection {
   static std::string uri_of(const std::string& path) {
     std::string uri;
     for (const char c : path) {
-      const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) || std::string_view("/-._~").find(c) < 5;
+      const bool is_plain =
+          std::isalnum(static_cast<unsigned char>(c)) || std::string_view("/-._~").find(c) != std::string_view::npos;
       uri += is_plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
     }
     return uri;
@@ -67,7 +71,8 @@ void add_header(pugi::xml_node mets, const MetsHeader& header) {
                                           {{"MIMETYPE", "text/xml"}, {"MDTYPE", "DC"}});
   const pugi::xml_node data = add_element(wrap, "xmlData");
   add_text(data, "dc:title", header.title);
-  add_text(data, "dc:language", header.language);
+  std::istringstream languages(header.language);
+  for (std::string language; std::getline(languages, language, '+');) add_text(data, "dc:language", language);
 }
 
 }  // namespace
