@@ -18,10 +18,10 @@ struct DeliveryOptions {
   std::string formats = "tiff,pdf";
   std::string page_name = "page_{page:04}";
   int first_page = 1;
-  std::string ocr;
-  std::string title;
+  std::string ocr = "";
+  std::string title = "";
   PdfImagePacking pdf_image = PdfImagePacking::jpeg;
-  PictureFileOptions picture;
+  PictureFileOptions picture{};
 
   template <class Visitor>
   void describe(Visitor&& visit) {

@@ -113,6 +113,7 @@ TEST(Deliver, APageThatChangedOrIsWantedOtherwiseIsMadeAnew) {
   const TestFolder folder;
   auto sources = some_sources(folder, 2);
   const auto break_off = [&](const DeliveryOptions& options) {
+    fs::remove_all(folder / "job/job.pdf");
     test::put(folder / "job/job.pdf/x", "");  // a folder in the PDF's place
     EXPECT_THAT(error_of([&] { deliver(sources, folder / "job", options, origin); }), HasSubstr("job.pdf"));
     fs::remove_all(folder / "job/job.pdf");

@@ -26,8 +26,8 @@ Picture some_picture(int width, int height, int channels) {
 /// Two words on a line that falls to the right, and one with letters from elsewhere.
 TextPage some_text() {
   TextPage text{.width_px = 600, .height_px = 400, .pixels_per_mm = 300 / 25.4, .blocks = {}};
-  TextLine first{{60, 100, 420, 150}, 0.01, -12, 44, {}}, second{{60, 200, 200, 240}, 0, -10, 40, {}};
-  first.words = {{"Light", {60, 100, 180, 146}, 0.9}, {"falls", {300, 104, 420, 150}, 0.9}};
+  TextLine first{{60, 100, 316, 149}, 0.01, -12, 44, {}}, second{{60, 200, 200, 240}, 0, -10, 40, {}};
+  first.words = {{"Light", {60, 100, 180, 146}, 0.9}, {"falls", {196, 103, 316, 149}, 0.9}};
   second.words = {{"Grüße纸𝄞", {60, 200, 200, 240}, 0.9}};
   text.blocks = {{{60, 100, 420, 240}, {{{60, 100, 420, 240}, "eng", {first, second}}}}};
   return text;
