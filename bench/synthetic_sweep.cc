@@ -58,12 +58,12 @@ Frames make_frames(const Camera& camera, std::vector<Image<std::uint8_t>> images
 }
 
 Frames expose_stripe(const TimeMap& passing, const Camera& camera, const Sweep& sweep, std::uint64_t seed) {
-  std::vector<Image<std::uint8_t>> images(static_cast<std::size_t>(sweep.count),
+  std::vector<Image<std::uint8_t>> images(static_cast<std::size_t>(sweep.frames()),
                                           Image<std::uint8_t>(camera.width, camera.height));
   const Noise noise(seed);
   const double sigma = sweep.sigma_frames();
   parallel_rows(camera.height, [&](int y) {
-    for (int i = 0; i < sweep.count; ++i) {
+    for (int i = 0; i < sweep.frames(); ++i) {
       const auto out = images[static_cast<std::size_t>(i)].row(y);
       for (int x = 0; x < camera.width; ++x) {
         const double t = (i - static_cast<double>(passing.time(x, y))) / sigma;
@@ -175,7 +175,7 @@ double error_over_bound(const SyntheticFrames& sweep, const Sweep& settings, con
       const double time = static_cast<double>(sweep.truth[c].time.data()[k]);
       if (measured[c].status.data()[k] != PixelStatus::ok || !std::isfinite(time)) continue;
       const testing::Pixel pixel{static_cast<double>(sweep.truth[c].amplitude.data()[k]), ambient, time};
-      bound_squares += std::pow(testing::cramer_rao_bound(shape, pixel, sensor, settings.count), 2);
+      bound_squares += std::pow(testing::cramer_rao_bound(shape, pixel, sensor, settings.frames()), 2);
       errors.push_back(static_cast<double>(measured[c].time.data()[k]) - time);
     }
   const auto count = static_cast<double>(errors.size());

@@ -24,7 +24,9 @@ SyntheticScene make_scene(int side_px);
 /// How the stripe passes over the scene.
 struct Sweep {
   int count = 200;                   ///< frames for the whole page
+  int after = 0;                     ///< frames that follow
   double stripe_sigma_share = 0.02;  ///< standard deviation of the stripe, of the sweep
+  int frames() const { return count + after; }
   double sigma_frames() const { return stripe_sigma_share * count; }
 };
 
