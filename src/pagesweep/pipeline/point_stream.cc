@@ -170,10 +170,10 @@ void PointStream::locate(double until) {
   triangulate(matches.from_first, cameras_[0], cameras_[1], options_.triangulation, sides_[0].points, &sides_[0].now);
   triangulate(matches.from_second, cameras_[1], cameras_[0], options_.triangulation, sides_[1].points, &sides_[1].now);
   for (std::size_t c = 0; c < sides_.size(); ++c) calibration_.add(sides_[c].points, times(c), &sides_[c].now);
+  if (options_.fusion && calibration_.has_news()) sweep_ = calibration_.fit();
 }
 
 void PointStream::fuse(double until) {
-  if (options_.fusion) sweep_ = calibration_.fit();
   // Without the sheet of light, points wait for it until the end.
   if (options_.fusion && !sweep_ && until < infinity) return;
   std::array<PixelSet, 2> stereo;

@@ -186,7 +186,8 @@ void LightCalibration::add(const PointMap& points, const TimeMap& times, const P
   }
 }
 
-std::optional<LightSweep> LightCalibration::fit() const {
+std::optional<LightSweep> LightCalibration::fit() {
+  fitted_ = sightings_.size();
   std::vector<Crossing> crossings;
   for (const Sighting& s : sightings_) crossings.push_back({s.point.cast<double>(), s.time, s.weight});
   if (crossings.size() < 1000) return std::nullopt;

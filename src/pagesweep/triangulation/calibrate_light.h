@@ -38,7 +38,9 @@ class LightCalibration {
   /// \throws std::invalid_argument  if points and times differ in size
   void add(const PointMap& points, const TimeMap& times, const PixelSet* only = nullptr);
   /// The fit to all points so far; nothing if there are fewer than 1000 or they cover fewer than ten frames.
-  std::optional<LightSweep> fit() const;
+  std::optional<LightSweep> fit();
+  /// Whether so many points have come since the last fit that the next one can be another: a hundredth.
+  bool has_news() const { return 100 * (sightings_.size() - fitted_) > sightings_.size(); }
 
  private:
   struct Sighting {
@@ -48,6 +50,7 @@ class LightCalibration {
   };
   std::size_t stride_;  ///< [pixels]
   std::vector<Sighting> sightings_;
+  std::size_t fitted_ = 0;  ///< how many there were at the last fit
 };
 
 /// The fit to all points of all cameras.

@@ -5,6 +5,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <vector>
 
 #include "pagesweep/base/local_plane.h"
 #include "pagesweep/base/parallel.h"
@@ -26,12 +28,18 @@ Eigen::Vector3f normal_of(const LocalPlane& plane, const RayTable& rays, int x, 
   return -Eigen::Vector3d(slope.x(), slope.y(), here).normalized().cast<float>();
 }
 
-Image<float> inverse_depths(const PointMap& points, const Camera& camera) {
+/// Of the rows within `reach` pixels of the set.
+Image<float> inverse_depths(const PointMap& points, const Camera& camera, const PixelSet* only, int reach) {
+  std::vector<std::uint8_t> takes_part(static_cast<std::size_t>(points.height()), only == nullptr);
+  for (int y = 0; only && y < points.height(); ++y)
+    if (std::ranges::any_of(only->row(y), [](std::uint8_t pixel) { return pixel != 0; }))
+      for (int i = std::max(0, y - reach); i <= std::min(y + reach, points.height() - 1); ++i)
+        takes_part[static_cast<std::size_t>(i)] = 1;
   Image<float> inverse_depth(points.width(), points.height(), not_a_number);
   const Eigen::Vector3d axis = camera.cam_from_rig.rotation.row(2);
   const double offset = camera.cam_from_rig.translation.z();
   parallel_rows(points.height(), [&](int y) {
-    for (int x = 0; x < points.width(); ++x) {
+    for (int x = 0; takes_part[static_cast<std::size_t>(y)] && x < points.width(); ++x) {
       if (points.status(x, y) != PixelStatus::ok) continue;
       const Eigen::Vector3d point(points.x(x, y), points.y(x, y), points.z(x, y));
       inverse_depth(x, y) = static_cast<float>(1 / (axis.dot(point) + offset));
@@ -48,7 +56,7 @@ void reject(PointMap& points, int x, int y) {
 }  // namespace
 
 void fit_normals(PointMap& points, const RayTable& camera, int radius_px, const PixelSet* only) {
-  const Image<float> inverse_depth = inverse_depths(points, camera.camera());
+  const Image<float> inverse_depth = inverse_depths(points, camera.camera(), only, radius_px);
   const Eigen::Matrix3f rig_from_cam = camera.camera().cam_from_rig.rotation.transpose().cast<float>();
   parallel_rows(points.height(), [&](int y) {
     Neighbourhood around;
