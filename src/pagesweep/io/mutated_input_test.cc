@@ -7,11 +7,14 @@
 #include "pagesweep/io/board_file.h"
 #include "pagesweep/io/capture_file.h"
 #include "pagesweep/io/colmap_rig.h"
+#include "pagesweep/io/color_profile.h"
 #include "pagesweep/io/files_testing.h"
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/kalibr_rig.h"
 #include "pagesweep/io/opencv_rig.h"
+#include "pagesweep/io/page_metadata.h"
+#include "pagesweep/io/pages_file.h"
 #include "pagesweep/io/ply_file.h"
 #include "pagesweep/io/recording_file.h"
 #include "pagesweep/io/rig_file.h"
@@ -70,6 +73,14 @@ Picture some_picture(int bit_depth) {
       },
       picture.samples);
   return picture;
+}
+
+Picture some_finished_page() {
+  Picture page = some_picture(8);
+  page.metadata["exif"] = make_exif({"", "Lumen", "XL 3", "", "2026:11:22 18:04:00", "", ""});
+  complete_profile(page);
+  complete_metadata(page, {"title", "source", "program"});
+  return page;
 }
 
 Rig some_rig() {
@@ -140,8 +151,12 @@ std::vector<Format> foreign_rigs() {
 
 std::vector<Format> all_formats() {
   using Path = std::filesystem::path;
-  const auto write_page = [](const Path& file) { write_picture(file, some_picture(8)); };
-  const auto read_page = [](const Path& file) { read_picture(file); };
+  const auto write_page = [](const Path& file) { write_picture(file, some_finished_page()); };
+  const auto read_page = [](const Path& file) {
+    Picture page = read_picture(file);
+    complete_profile(page);
+    complete_metadata(page, {"title", "source", "program"});
+  };
   const auto read_frame = [](const Path& file) { read_gray(file); };
   const auto write_ascii = [](const Path& file) {
     write_bytes(
@@ -158,6 +173,9 @@ std::vector<Format> all_formats() {
       {"board.json", [](const Path& file) { write_board(file, {}); }, [](const Path& file) { read_board(file); }},
       {"capture.json", write_capture_to, [](const Path& file) { read_capture(file); }},
       {"truth.json", write_truth_to, [](const Path& file) { read_truth(file); }},
+      {"pages.json",
+       [](const Path& file) { write_pages_file(file.parent_path(), {"book", {{1, "page_1.png", "left"}}}); },
+       [](const Path& file) { read_pages_file(file.parent_path()); }},
       {"points.ply", write_ply_to, [](const Path& file) { read_ply(file); }},
       {"ascii.ply", write_ascii, [](const Path& file) { read_ply(file); }},
       {"map.tiff", write_map, [](const Path& file) { read_float_tiff(file); }},

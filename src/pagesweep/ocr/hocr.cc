@@ -17,6 +17,7 @@ namespace pagesweep {
 namespace {
 
 constexpr double mm_per_inch = 25.4;
+constexpr double most_px = 1e6;
 
 /// The properties in an element's title: "bbox 0 0 20 10; baseline 0.01 -3; x_wconf 96".
 class Properties {
@@ -32,7 +33,7 @@ class Properties {
       std::string word;
       if (!(words >> word) || word != name) continue;
       std::vector<double> values;
-      for (double value = 0; words >> value;) values.push_back(value);
+      for (double value = 0; words >> value;) values.push_back(checked(value));
       if (values.size() >= count) return values;
     }
     return std::nullopt;
@@ -48,6 +49,11 @@ class Properties {
   Error error(const std::string& problem) const { return bad_input(file_, id_, problem); }
 
  private:
+  double checked(double value) const {
+    if (!(std::abs(value) <= most_px)) throw error(fmt::format("{} is no place on a page", value));
+    return value;
+  }
+
   std::string title_, id_;
   const std::filesystem::path& file_;
 };
@@ -66,6 +72,7 @@ std::string text_of(pugi::xml_node element) {
   std::string text;
   for (const pugi::xml_node child : element.children()) text += text_of(child);
   text += element.value();
+  std::erase_if(text, [](char c) { return static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t'; });
   const auto begin = text.find_first_not_of(" \t\r\n");
   return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\r\n") + 1 - begin);
 }
@@ -195,6 +202,7 @@ TextPage parse_hocr(std::string_view text, const std::filesystem::path& file) {
   TextPage page;
   page.width_px = static_cast<int>(properties.box().right);
   page.height_px = static_cast<int>(properties.box().bottom);
+  if (page.width_px < 1 || page.height_px < 1) throw properties.error("the page is empty");
   if (const auto resolution = properties.numbers("scan_res", 2)) page.pixels_per_mm = resolution->front() / mm_per_inch;
   for (const pugi::xml_node child : element.children()) {
     if (!is_of_class(child, {"ocr_carea"})) continue;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/ocr/hocr.h"
 
+#include <iterator>
+#include <random>
+
 #include "pagesweep/io/files_testing.h"
 
 namespace pagesweep {
@@ -64,6 +67,20 @@ TEST(Hocr, NeverCrashesOnATextThatIsCutShort) {
   const std::string whole = some_hocr();
   for (std::size_t length = 0; length + 20 < whole.size(); length += 7)
     EXPECT_NE(error_of([&] { parse_hocr(whole.substr(0, length), "cut.hocr"); }), "") << length;
+}
+
+TEST(Hocr, ReadsOrRefusesATextThatWasChanged) {
+  const std::string whole = some_hocr();
+  const std::string pieces[] = {"-", "1e308", "nan", "<", "'", "99999999", "&#0;", ""};
+  std::mt19937 random(1);
+  int refused = 0;
+  for (int round = 0; round < 500; ++round) {
+    std::string changed = whole;
+    for (int change = 0; change < 2; ++change)
+      changed.replace(random() % changed.size(), random() % 9, pieces[random() % std::size(pieces)]);
+    refused += !error_of([&] { parse_hocr(changed, "changed.hocr"); }).empty();
+  }
+  EXPECT_GT(refused, 50);
 }
 
 }  // namespace
