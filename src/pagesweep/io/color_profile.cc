@@ -21,6 +21,11 @@ class Bytes {
     for (int shift = 24; shift >= 0; shift -= 8) bytes_ += static_cast<char>(value >> shift & 0xFF);
     return *this;
   }
+  Bytes& half(long value) {
+    bytes_ += static_cast<char>(value >> 8 & 0xFF);
+    bytes_ += static_cast<char>(value & 0xFF);
+    return *this;
+  }
   /// s15Fixed16Number
   Bytes& fixed(double value) { return number(static_cast<std::uint32_t>(std::lround(value * 65536))); }
   Bytes& append(const Bytes& other) { return text(other.bytes_); }
@@ -36,14 +41,14 @@ class Bytes {
   std::string bytes_;
 };
 
-/// multiLocalizedUnicodeType with one text.
-Bytes localized(std::string_view text) {
+/// textDescriptionType: the text in ASCII, and none in Unicode and in the Macintosh's script code.
+Bytes description(std::string_view text) {
   Bytes tag;
-  tag.text("mluc").number(0).number(1).number(12).text("enUS").number(static_cast<std::uint32_t>(2 * text.size()));
-  tag.number(28);
-  for (const char letter : text) tag.zeros(1).text({&letter, 1});
-  return tag.pad(4);
+  tag.text("desc").number(0).number(static_cast<std::uint32_t>(text.size() + 1)).text(text);
+  return tag.zeros(1 + 4 + 4 + 2 + 1 + 67).pad(4);
 }
+
+Bytes plain_text(std::string_view text) { return Bytes().text("text").number(0).text(text).zeros(1).pad(4); }
 
 Bytes xyz(double x, double y, double z) { return Bytes().text("XYZ ").number(0).fixed(x).fixed(y).fixed(z); }
 
@@ -52,37 +57,35 @@ struct Tag {
   Bytes data;
 };
 
-/// parametricCurveType, function 3: ((x + 0.055) / 1.055)^2.4, below 0.04045 x / 12.92
+/// curveType: light over sample, at 1024 samples: ((x + 0.055) / 1.055)^2.4, below 0.04045 x / 12.92.
 Bytes srgb_curve() {
+  constexpr int samples = 1024;
   Bytes curve;
-  curve.text("para").number(0).number(3u << 16);
-  for (const double parameter : {2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045}) curve.fixed(parameter);
+  curve.text("curv").number(0).number(samples);
+  for (int i = 0; i < samples; ++i) {
+    const double x = static_cast<double>(i) / (samples - 1);
+    curve.half(std::lround(65535 * (x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4))));
+  }
   return curve;
 }
 
 /// The tags of a matrix profile. Primaries and white are those of sRGB, adapted to D50 by Bradford's matrix.
 std::vector<Tag> srgb_tags() {
   const Bytes curve = srgb_curve();
-  Bytes adaptation;
-  adaptation.text("sf32").number(0);
-  for (const double value :
-       {1.047882, 0.022918, -0.050217, 0.029587, 0.990479, -0.017059, -0.009232, 0.015076, 0.751678})
-    adaptation.fixed(value);
-  return {{"desc", localized("sRGB")},
-          {"cprt", localized("No copyright, use freely")},
+  return {{"desc", description("sRGB")},
+          {"cprt", plain_text("No copyright, use freely")},
           {"wtpt", xyz(0.9642, 1.0, 0.8249)},
           {"rXYZ", xyz(0.43607, 0.22249, 0.01392)},
           {"gXYZ", xyz(0.38515, 0.71687, 0.09708)},
           {"bXYZ", xyz(0.14307, 0.06061, 0.71410)},
           {"rTRC", curve},
           {"gTRC", curve},
-          {"bTRC", curve},
-          {"chad", adaptation}};
+          {"bTRC", curve}};
 }
 
 std::vector<Tag> gray_tags() {
-  return {{"desc", localized("Gray with the tone curve of sRGB")},
-          {"cprt", localized("No copyright, use freely")},
+  return {{"desc", description("Gray with the tone curve of sRGB")},
+          {"cprt", plain_text("No copyright, use freely")},
           {"wtpt", xyz(0.9642, 1.0, 0.8249)},
           {"kTRC", srgb_curve()}};
 }
@@ -98,7 +101,7 @@ std::vector<std::byte> make_profile(std::string_view space, const std::vector<Ta
     data.append(tag.data).pad(4);
   }
   Bytes profile;
-  profile.number(static_cast<std::uint32_t>(data_start + data.size())).zeros(4).number(0x04200000);
+  profile.number(static_cast<std::uint32_t>(data_start + data.size())).zeros(4).number(0x02100000);
   profile.text("mntr").text(space).text("XYZ ").number(2024u << 16 | 1).number(1u << 16).number(0).text("acsp");
   profile.zeros(28).fixed(0.9642).fixed(1.0).fixed(0.8249).zeros(48);
   const std::string bytes = profile.append(table).append(data).get();

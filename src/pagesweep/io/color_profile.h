@@ -8,8 +8,8 @@
 
 namespace pagesweep {
 
-/// An ICC profile (ISO 15076-1, version 4.2, which PDF/A-2 and JPEG 2000 allow) that says: these samples are sRGB (IEC
-/// 61966-2-1).
+/// An ICC profile that says: these samples are sRGB (IEC 61966-2-1). Of version 2.1 (ICC.1:1998-09) and a matrix with
+/// curves, which is all that JPEG 2000 allows.
 std::vector<std::byte> make_srgb_profile();
 /// The same for one channel of gray: the tone curve of sRGB.
 std::vector<std::byte> make_gray_profile();

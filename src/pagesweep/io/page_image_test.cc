@@ -4,6 +4,7 @@
 
 #include <map>
 #include <pugixml.hpp>
+#include <vips/vips8>
 
 #include "pagesweep/io/color_profile.h"
 #include "pagesweep/io/files_testing.h"
@@ -189,6 +190,27 @@ TEST(PageImage, AGrayPageDoesNotTakeOverAProfileOfColours) {
   const auto own = colored.icc_profile;
   complete_profile(colored);
   EXPECT_EQ(colored.icc_profile, own);
+}
+
+/// What Little CMS makes of our profiles, against its own sRGB.
+TEST(PageImage, ColoursUnderOurProfilesAreThoseOfSrgb) {
+  const TestFolder folder;
+  for (const int channels : {1, 3}) {
+    Picture picture = make_picture(256, 1, channels, 8);
+    auto& samples = std::get<0>(picture.samples);
+    for (int x = 0; x < 256; ++x)
+      for (int c = 0; c < channels; ++c) samples(channels * x + c, 0) = static_cast<std::uint8_t>(c == 1 ? 255 - x : x);
+    complete_profile(picture);
+    write_picture(folder / "a.tif", picture);
+    const auto seen = vips::VImage::new_from_file((folder / "a.tif").c_str())
+                          .icc_transform("srgb", vips::VImage::option()->set("embedded", true));
+    for (int x = 0; x < 256; ++x) {
+      const std::vector<double> pixel = seen.getpoint(x, 0);
+      ASSERT_EQ(pixel.size(), 3u);
+      for (std::size_t c = 0; c < 3; ++c)
+        EXPECT_NEAR(pixel[c], channels == 3 && c == 1 ? 255 - x : x, 1.0) << channels << " " << x;
+    }
+  }
 }
 
 TEST(PageImage, SixteenBitBecomeTheNearestEight) {
