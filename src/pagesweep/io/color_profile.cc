@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -95,10 +96,12 @@ std::vector<std::byte> make_profile(std::string_view space, const std::vector<Ta
   Bytes table, data;
   const std::size_t data_start = 128 + 4 + 12 * tags.size();
   table.number(static_cast<std::uint32_t>(tags.size()));
+  std::map<std::string, std::size_t> places;  // tags with the same data share them
   for (const Tag& tag : tags) {
-    table.text(tag.name).number(static_cast<std::uint32_t>(data_start + data.size()));
+    const auto [place, is_new] = places.try_emplace(tag.data.get(), data_start + data.size());
+    if (is_new) data.append(tag.data).pad(4);
+    table.text(tag.name).number(static_cast<std::uint32_t>(place->second));
     table.number(static_cast<std::uint32_t>(tag.data.size()));
-    data.append(tag.data).pad(4);
   }
   Bytes profile;
   profile.number(static_cast<std::uint32_t>(data_start + data.size())).zeros(4).number(0x02100000);
