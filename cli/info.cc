@@ -13,6 +13,7 @@
 #include "cli/describe.h"
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/delivery/mets.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/json_reader.h"
 #include "pagesweep/io/ply_file.h"
@@ -48,12 +49,26 @@ Description inspect_json(const fs::path& file, Progress& progress) {
   throw bad_input(file, "format", fmt::format("'{}' is no format that pagesweep knows", format));
 }
 
+/// Reads every file that was delivered: one that is missing or was changed comes out as an Error.
+Description inspect_job(const fs::path& folder, Progress& progress) {
+  progress.begin("comparing the files with mets.xml");
+  const MetsListing listing = read_mets(folder / "mets.xml");
+  check_files(folder, listing);
+  Description description;
+  description.lines.push_back(fmt::format("a job, '{}': {} pages, {} files, all as they were delivered", listing.title,
+                                          listing.pages, listing.files.size()));
+  description.json = {
+      {"kind", "job"}, {"title", listing.title}, {"pages", listing.pages}, {"files", listing.files.size()}};
+  return description;
+}
+
 Description inspect_folder(const fs::path& folder, Progress& progress) {
+  if (fs::exists(folder / "mets.xml")) return inspect_job(folder, progress);
   for (const char* index : {"capture.json", "report.json", "truth.json"})
     if (fs::exists(folder / index)) return inspect_json(folder / index, progress);
   throw bad_input(folder, "",
-                  "holds neither capture.json (a capture), report.json (a result) nor truth.json (reference data); a "
-                  "result without report.json is unfinished");
+                  "holds neither capture.json (a capture), report.json (a result), truth.json (reference data) nor "
+                  "mets.xml (a job); a result without report.json or a job without mets.xml is unfinished");
 }
 
 Description inspect(const fs::path& path, Progress& progress) {
@@ -77,8 +92,9 @@ void run(const Arguments& arguments) {
 void add_info_command(CLI::App& app) {
   auto* command = app.add_subcommand("info", R"(Say what a file or folder is, and whether it is sound.
 
-Knows captures, rigs, results, reference data, point clouds (PLY) and pictures. A capture is
-read to its last frame: what is broken in it is found here, before a measurement.
+Knows captures, rigs, results, jobs, reference data, point clouds (PLY) and pictures. A capture
+is read to its last frame: what is broken in it is found here, before a measurement. Of a job
+every file is compared with the checksum in mets.xml.
 )");
   const auto arguments = std::make_shared<Arguments>();
   add_input(*command, "PATH", arguments->input, "a file or a folder");

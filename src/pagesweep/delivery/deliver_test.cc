@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/delivery/deliver.h"
 
+#include <fmt/format.h>
+
 #include <pugixml.hpp>
 #include <set>
 
@@ -34,7 +36,7 @@ fs::path write_page(const TestFolder& folder, const std::string& name, int gray)
 
 std::vector<PageSource> some_sources(const TestFolder& folder, int count = 3) {
   std::vector<fs::path> pages;
-  for (int i = 0; i < count; ++i) pages.push_back(write_page(folder, "p" + std::to_string(i) + ".png", 100 + i));
+  for (int i = 0; i < count; ++i) pages.push_back(write_page(folder, fmt::format("p{}.png", i), 100 + i));
   return find_pages(pages);
 }
 
@@ -88,6 +90,38 @@ TEST(Deliver, TheMetsListsEachFileWithItsChecksumAndThePagesInOrder) {
   EXPECT_EQ(order, 3);
   EXPECT_EQ(ids.erase(sequence.child("fptr").attribute("FILEID").value()), 1u);
   EXPECT_TRUE(ids.empty());
+}
+
+TEST(Deliver, WhatWasDeliveredCanBeChecked) {
+  const TestFolder folder;
+  deliver(some_sources(folder), folder / "job", {.formats = "tiff,pdf", .page_name = "ä %{page}"}, origin);
+  const MetsListing listing = read_mets(folder / "job/mets.xml");
+  EXPECT_EQ(listing.pages, 3u);
+  EXPECT_EQ(listing.files.size(), 4u);
+  EXPECT_EQ(error_of([&] { check_files(folder / "job", listing); }), "");
+  const fs::path page = folder / "job/tiff/ä %2.tif";
+  std::string bytes = read_text(page);
+  bytes.back() = static_cast<char>(bytes.back() ^ 1);
+  test::put(page, bytes);
+  EXPECT_THAT(error_of([&] { check_files(folder / "job", listing); }),
+              AllOf(HasSubstr("%2.tif"), HasSubstr("checksum")));
+  fs::remove(page);
+  EXPECT_THAT(error_of([&] { check_files(folder / "job", listing); }), HasSubstr("is not there"));
+}
+
+TEST(Deliver, AListingMayNotLeadOutOfItsFolder) {
+  const TestFolder folder;
+  deliver(some_sources(folder, 1), folder / "job", {.formats = "tiff"}, origin);
+  const fs::path mets = folder / "job/mets.xml";
+  const std::string text = read_text(mets);
+  const std::string name = "tiff/page_0001.tif";
+  const std::size_t at = text.find(name);
+  for (const char* path : {"../p0.png", "/etc/passwd", "tiff/%2E%2e/../x", ""}) {
+    test::put(mets, fmt::format("{}{}{}", text.substr(0, at), path, text.substr(at + name.size())));
+    EXPECT_THAT(error_of([&] { read_mets(mets); }), HasSubstr("page_1_tiff: expected a file in this folder")) << path;
+  }
+  test::put(mets, text.substr(0, text.size() / 2));
+  EXPECT_THAT(error_of([&] { read_mets(mets); }), HasSubstr("mets.xml: byte"));
 }
 
 TEST(Deliver, GoesOnWhereItWasBrokenOff) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -33,5 +35,20 @@ struct MetsHeader {
 /// the physical structure, to which files of the whole job (a PDF) belong as well.
 std::string format_mets(const MetsHeader& header, const std::vector<DeliveredPage>& pages,
                         const std::vector<DeliveredFile>& of_the_job);
+
+/// What a METS file lists.
+struct MetsListing {
+  std::string title;
+  std::size_t pages = 0;
+  std::vector<DeliveredFile> files;  ///< their `group` is the file's ID there
+};
+
+/// Reads a file that format_mets() wrote.
+/// \throws Error  if it cannot be read, is no METS, or lists a file without SHA-256 or outside of its folder
+MetsListing read_mets(const std::filesystem::path& file);
+
+/// Reads every file of a listing and compares size and checksum.
+/// \throws Error  that names the first that is missing or another than the listing says
+void check_files(const std::filesystem::path& folder, const MetsListing& listing);
 
 }  // namespace pagesweep
