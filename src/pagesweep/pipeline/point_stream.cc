@@ -19,10 +19,12 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double to_correct_px = 30;  ///< planes through the times around, and beyond a step in depth
 constexpr double to_match_px = 5;     ///< links between times
 constexpr double to_confirm_px = 3;   ///< matches from the other side
-constexpr double to_fuse_px = 16;     ///< lateness of the light
+constexpr double to_fuse_px = 16;     ///< lateness of the light,
+constexpr double to_fuse = 12;        ///< [frames] and what makes the planes of the light sure: three of their knots
 constexpr double to_finish_px = 4;    ///< the plane that gives the normal
-/// Fewer at a time, and what all parts together are asked for is asked too often.
-constexpr double part_px = 96;
+// Parts, as a share of the picture's longer side. The first one has no older ones to learn from; if the others were
+// smaller, what all together are asked for would be asked too often.
+constexpr double first_part = 0.33, next_part = 0.1;
 
 /// [frames] that the stripe takes from a pixel to the next, where it is slow: it has passed nine of ten pixels faster.
 /// \return 0 if hardly any times are known
@@ -80,7 +82,10 @@ void PointStream::follow(const Times& seen, double known_until) {
   if (!(known_until > known_until_)) return;
   known_until_ = known_until;
   frames_a_pixel_ = std::max(slowest_passage(*seen[0]), slowest_passage(*seen[1]));
-  if (!(frames_a_pixel_ > 0) || known_until < done_until_ + part_px * frames_a_pixel_) return;
+  if (!(frames_a_pixel_ > 0)) return;
+  const double passage = frames_a_pixel_ * std::max(seen[0]->width(), seen[0]->height());  // [frames] over the picture
+  if (done_until_ == -infinity) done_until_ = known_until + (first_part - next_part) * passage;
+  if (known_until < done_until_ + next_part * passage) return;
   go_on(seen, known_until, no_progress());
   done_until_ = known_until;
 }
@@ -114,7 +119,8 @@ void PointStream::go_on(const Times& seen, double until, Progress& progress) {
   stay_behind(to_match_px);
   if (step_on(timed, until)) matching_.match(times(0), times(1), now(), progress);
   locate(stay_behind(to_confirm_px));
-  fuse(stay_behind(to_fuse_px));
+  stay_behind(to_fuse_px);
+  fuse(until -= to_fuse);
   if (steps_.fits_normals) fit_normals(stay_behind(to_finish_px));
 }
 
