@@ -91,7 +91,7 @@ void PointStream::follow(const Times& seen, double known_until) {
 }
 
 void PointStream::finish(const Times& seen, Measurement& measurement, Progress& progress) {
-  for (std::size_t c = 0; c < sides_.size(); ++c) forget_changed(*seen[c], sides_[c]);
+  forget_changed(seen);
   go_on(seen, infinity, progress);
   measurement.points.clear();
   measurement.fusion.clear();
@@ -202,20 +202,35 @@ void PointStream::fit_normals(double until) {
     pagesweep::fit_normals(sides_[c].points, cameras_[c], options_.triangulation.normal_radius_px, &sides_[c].now);
 }
 
-void PointStream::forget_changed(const TimeMap& seen, Side& side) {
-  parallel_rows(side.step.height(), [&](int y) {
-    for (int x = 0; x < side.step.width(); ++x) {
-      // Less than that of a standard deviation is worth nothing.
-      constexpr float little = 0.1f;
-      const float change = std::abs(seen.time(x, y) - side.taken(x, y));
-      if (side.step(x, y) == none || change < little * seen.sigma(x, y)) continue;
-      side.step(x, y) = none;
-      PointMap& points = side.points;
-      points.x(x, y) = points.y(x, y) = points.z(x, y) = points.sigma(x, y) = not_a_number;
-      if (steps_.fits_normals) points.nx(x, y) = points.ny(x, y) = points.nz(x, y) = not_a_number;
-      points.status(x, y) = PixelStatus::not_computed;
+void PointStream::forget_changed(const Times& seen) {
+  constexpr int reach_px = 3;  // of what a pixel's way depends on
+  const MatchPair& pair = matching_.matches();
+  for (std::size_t c = 0; c < sides_.size(); ++c) {
+    const Image<std::uint8_t> step = sides_[c].step;  // as it was before anything was forgotten
+    const Correspondences& matches = c == 0 ? pair.from_first : pair.from_second;
+    for (int y = 0; y < step.height(); ++y)
+      for (int x = 0; x < step.width(); ++x) {
+        // Less than that of a standard deviation is worth nothing.
+        constexpr float little = 0.1f;
+        const float change = std::abs(seen[c]->time(x, y) - sides_[c].taken(x, y));
+        if (step(x, y) == none || change < little * seen[c]->sigma(x, y)) continue;
+        forget(sides_[c], x, y, reach_px);
+        if (step(x, y) > timed && std::isfinite(matches.u(x, y)))
+          forget(sides_[1 - c], static_cast<int>(std::lround(matches.u(x, y))),
+                 static_cast<int>(std::lround(matches.v(x, y))), reach_px);
+      }
+  }
+}
+
+void PointStream::forget(Side& side, int x, int y, int reach) {
+  PointMap& points = side.points;
+  for (int j = std::max(0, y - reach); j <= std::min(y + reach, points.height() - 1); ++j)
+    for (int i = std::max(0, x - reach); i <= std::min(x + reach, points.width() - 1); ++i) {
+      side.step(i, j) = none;
+      points.x(i, j) = points.y(i, j) = points.z(i, j) = points.sigma(i, j) = not_a_number;
+      if (steps_.fits_normals) points.nx(i, j) = points.ny(i, j) = points.nz(i, j) = not_a_number;
+      points.status(i, j) = PixelStatus::not_computed;
     }
-  });
 }
 
 }  // namespace pagesweep

@@ -69,7 +69,9 @@ class PointStream {
   /// \return whether there are any
   bool step_on(Step from, double until);
   bool step_on(Side& side, const TimeMap& times, Step from, double until);
-  void forget_changed(const TimeMap& seen, Side& side);
+  /// Lets pixels whose time has changed begin again, and those around them and around their matches.
+  void forget_changed(const Times& seen);
+  void forget(Side& side, int x, int y, int reach);
   const TimeMap& times(std::size_t c) const { return steps_.corrects_edges ? sides_[c].corrected : *seen_[c]; }
   PixelSets now() const { return {&sides_[0].now, &sides_[1].now}; }
 
