@@ -30,8 +30,14 @@ struct PageSurface {
   Image<Eigen::Vector3f> measured;  ///< [mm] rig frame
   Image<float> sigma;               ///< [mm] one standard deviation of `measured` along the normal; NaN: bridged
   Image<PixelStatus> status;        ///< of `measured`
-  bool gutter_at_left = false;      ///< the left end of the grid is the book's gutter: the page ends there
-  bool gutter_at_right = false;     ///< likewise the right end
+  /// [mm] By how much something that is not the paper (finger, clip, slip) stands above it at a node; NaN where nothing
+  /// does. Such nodes have the status `covered`, and `measured` is the paper below. Empty: not looked for.
+  Image<float> cover_mm;
+  /// By how much the sheet seems stretched around a node, relative, and the standard deviation that the measurement
+  /// explains; NaN where it is not measured. Empty: not computed.
+  Image<float> strain, strain_sigma;
+  bool gutter_at_left = false;   ///< the left end of the grid is the book's gutter: the page ends there
+  bool gutter_at_right = false;  ///< likewise the right end
 
   int columns() const { return model.width(); }
   int rows() const { return model.height(); }

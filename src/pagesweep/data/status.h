@@ -26,12 +26,13 @@ enum class PixelStatus : std::uint8_t {
   rays_miss,      ///< the two viewing rays pass each other too far apart
   off_surface,    ///< an outlier to the surface around it
   hidden,         ///< the spot is not seen: occluded, or outside the scan
+  covered,        ///< something that is not the paper stands above it: a finger, a clip, a slip of paper
 };
 
 constexpr auto names_of(PixelStatus) {
-  return std::array<std::string_view, 14>{
-      "ok",       "not_computed", "too_dark",     "truncated",     "saturated", "bad_fit",     "outside_view",
-      "no_match", "ambiguous",    "inconsistent", "outside_depth", "rays_miss", "off_surface", "hidden"};
+  return std::array<std::string_view, 15>{
+      "ok",        "not_computed", "too_dark",      "truncated", "saturated",   "bad_fit", "outside_view", "no_match",
+      "ambiguous", "inconsistent", "outside_depth", "rays_miss", "off_surface", "hidden",  "covered"};
 }
 
 }  // namespace pagesweep

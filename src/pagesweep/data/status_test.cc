@@ -11,7 +11,7 @@ TEST(PixelStatus, EveryValueHasItsName) {
   EXPECT_EQ(name_of(PixelStatus::hidden), "hidden");
   EXPECT_EQ(value_named<PixelStatus>("off_surface"), PixelStatus::off_surface);
   EXPECT_EQ(value_named<PixelStatus>("no such"), std::nullopt);
-  EXPECT_EQ(names_of(PixelStatus{}).size(), static_cast<std::size_t>(PixelStatus::hidden) + 1);
+  EXPECT_EQ(names_of(PixelStatus{}).size(), static_cast<std::size_t>(PixelStatus::covered) + 1);
 }
 
 }  // namespace

@@ -112,6 +112,8 @@ Rgb colour_of(PixelStatus status) {
       return {150, 24, 40};
     case PixelStatus::hidden:
       return {112, 128, 92};
+    case PixelStatus::covered:
+      return {232, 146, 124};
   }
   return no_value_colour;
 }

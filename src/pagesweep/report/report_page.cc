@@ -45,6 +45,8 @@ std::string_view words_of(PixelStatus status) {
       return "an outlier to the surface around it";
     case PixelStatus::hidden:
       return "not seen";
+    case PixelStatus::covered:
+      return "covered by what is not the paper: a finger, a clip, a slip";
   }
   return "unknown";
 }
