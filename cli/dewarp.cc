@@ -20,6 +20,7 @@ struct Arguments {
   std::filesystem::path output;
   ScanOptions options;
   PageFileOptions files;
+  QualityArguments quality;
 };
 
 void run(const Arguments& arguments) {
@@ -44,7 +45,9 @@ void run(const Arguments& arguments) {
                    .measurement = scan.measurement,
                    .surfaces = scan.surfaces,
                    .pages = scan.pages,
-                   .scan = &picture};
+                   .scan = &picture,
+                   .kernel = arguments.options.dewarp.resampling.kernel,
+                   .fail_on = arguments.quality.fail_on};
   add_flattening_options(result.options, arguments.options);
   finish_result(output, result, progress, arguments.common);
 }
@@ -65,6 +68,7 @@ needed.
   add_output(*command, arguments->output, "where the pages go; may be RESULT itself");
   arguments->options.describe_pages(OptionVisitor(*command, "Flattening"));
   arguments->files.describe(OptionVisitor(*command, "Files"));
+  arguments->quality.describe(OptionVisitor(*command, "Quality"));
   add_common_options(*command, arguments->common);
   command->footer(R"(Examples:
   pagesweep dewarp result capture -o result                     # in place

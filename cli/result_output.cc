@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "cli/exit_code.h"
 #include "pagesweep/io/atomic_file.h"
 
 namespace pagesweep::cli {
@@ -74,7 +76,7 @@ std::vector<CameraReport> cameras_of(const RunResult& result) {
   return cameras;
 }
 
-ReportInputs inputs_of(const RunResult& result, const ConsoleProgress& progress) {
+ReportInputs inputs_of(const RunResult& result, std::span<const PageQuality> quality, const ConsoleProgress& progress) {
   ReportInputs inputs;
   inputs.title = result.title;
   inputs.program = "pagesweep " PAGESWEEP_VERSION;
@@ -88,6 +90,7 @@ ReportInputs inputs_of(const RunResult& result, const ConsoleProgress& progress)
     for (Figure& figure : figures_of(*sweep)) inputs.figures.push_back(std::move(figure));
   inputs.surfaces = result.surfaces;
   inputs.pages = result.pages;
+  inputs.quality = quality;
   inputs.scan = result.scan;
   inputs.pages_expected = result.scan != nullptr;
   inputs.options = result.options;
@@ -120,12 +123,22 @@ void add_flattening_options(std::vector<OptionValue>& values, const ScanOptions&
 
 void finish_result(OutputFolder& output, const RunResult& result, ConsoleProgress& progress,
                    const CommonOptions& options) {
+  std::vector<PageQuality> quality;
+  if (result.scan) {
+    progress.begin("measuring the pages' quality");
+    quality = measure_quality(result.pages, result.surfaces, *result.scan, result.kernel);
+  }
   progress.finish();
-  const ReportInputs inputs = inputs_of(result, progress);
+  const ReportInputs inputs = inputs_of(result, quality, progress);
   write_report(output.path(), inputs);
   output.finish();
   const std::string report = read_bytes(output.path() / "report.json", most_report_bytes);
   print_answer(options, nlohmann::ordered_json::parse(report), summary(output, judge(inputs)));
+  const auto worst = std::ranges::max_element(quality, {}, &PageQuality::verdict);
+  if (worst == quality.end() || result.fail_on == FailOn::never) return;
+  if (worst->verdict == PageVerdict::scan_again ||
+      (worst->verdict == PageVerdict::look && result.fail_on == FailOn::look))
+    throw LimitExceeded{};
 }
 
 }  // namespace pagesweep::cli

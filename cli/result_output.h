@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "cli/command.h"
@@ -13,6 +15,19 @@
 
 namespace pagesweep::cli {
 
+/// When a page's quality ends the program with exit code 7.
+enum class FailOn { never, scan_again, look };
+constexpr auto names_of(FailOn) { return std::array<std::string_view, 3>{"never", "scan_again", "look"}; }
+
+struct QualityArguments {
+  FailOn fail_on = FailOn::never;
+  template <class Visitor>
+  void describe(Visitor&& visit) {
+    visit("fail-on", fail_on, "",
+          "exit with code 7 if a page's verdict is scan_again, or look as well; all files are written all the same");
+  }
+};
+
 /// What a finished run can tell. What it has not is left empty.
 struct RunResult {
   std::string title;
@@ -21,6 +36,8 @@ struct RunResult {
   std::span<const PageSurface> surfaces = {};
   std::span<const Page> pages = {};
   const Picture* scan = nullptr;
+  ResampleKernel kernel = ResampleKernel::lanczos3;  ///< that pages were made with
+  FailOn fail_on = FailOn::never;
   std::vector<OptionValue> options = {};
 };
 

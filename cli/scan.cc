@@ -21,6 +21,7 @@ struct Arguments {
   std::filesystem::path output;
   ScanOptions options;
   PageFileOptions files;
+  QualityArguments quality;
 };
 
 void run(const Arguments& arguments) {
@@ -47,7 +48,9 @@ void run(const Arguments& arguments) {
                    .measurement = scan.measurement,
                    .surfaces = scan.surfaces,
                    .pages = scan.pages,
-                   .scan = &read()};
+                   .scan = &read(),
+                   .kernel = arguments.options.dewarp.resampling.kernel,
+                   .fail_on = arguments.quality.fail_on};
   add_measuring_options(result.options, arguments.options);
   add_flattening_options(result.options, arguments.options);
   finish_result(output, result, progress, arguments.common);
@@ -75,6 +78,7 @@ Reads a capture (the frames of both cameras, the scanner's picture and the rig) 
   arguments->options.describe_measurement(OptionVisitor(*command, "Measuring"));
   arguments->options.describe_pages(OptionVisitor(*command, "Flattening"));
   arguments->files.describe(OptionVisitor(*command, "Files"));
+  arguments->quality.describe(OptionVisitor(*command, "Quality"));
   add_common_options(*command, arguments->common);
   command->footer(R"(Examples:
   pagesweep scan capture -o result

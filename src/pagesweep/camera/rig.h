@@ -7,6 +7,7 @@
 
 #include "pagesweep/camera/camera.h"
 #include "pagesweep/camera/light.h"
+#include "pagesweep/camera/scan_light.h"
 #include "pagesweep/camera/scanner.h"
 
 namespace pagesweep {
@@ -17,6 +18,8 @@ struct Rig {
   std::vector<Camera> cameras;
   std::optional<Scanner> scanner;
   std::optional<Light> light;
+  std::optional<LampBar> lamp;          ///< where that light comes from
+  std::optional<WhiteReference> white;  ///< what the scanner makes of white
 
   /// The camera with that name, or nullptr.
   const Camera* find_camera(std::string_view name) const;

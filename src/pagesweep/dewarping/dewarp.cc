@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "pagesweep/base/parallel.h"
@@ -75,7 +76,7 @@ Page make_page(const PaperView& view, const Occlusion& occlusion, const PageOutl
 }  // namespace
 
 std::vector<Page> dewarp(std::span<const PageSurface> surfaces, const Picture& scan, const Scanner& scanner,
-                         const DewarpOptions& options, Progress& progress) {
+                         const DewarpOptions& options, Progress& progress, const ScanLight& light) {
   check(scan, scanner, options);
   progress.begin("flat pages");
   const PaperShape shape = options.difference_vector ? PaperShape::measured : PaperShape::model;
@@ -89,10 +90,13 @@ std::vector<Page> dewarp(std::span<const PageSurface> surfaces, const Picture& s
   for (std::size_t k = 0; k < views.size(); ++k) warn_of_missing_edges(outlines[k], surfaces[k].index, progress);
   const double pixels_per_mm = choose_pixels_per_mm(views, outlines, scan, options);
   const Occlusion occlusion(views);
+  std::optional<PageLight> page_light;
+  if (options.shading == Shading::even) page_light.emplace(views, scan, light);
   std::vector<Page> pages(views.size());
   parallel_rows(static_cast<int>(views.size()), [&](int k) {
     const auto n = static_cast<std::size_t>(k);
     pages[n] = make_page(views[n], occlusion, outlines[n], pixels_per_mm, scan, options.resampling);
+    if (page_light) apply_gain(page_light->gain(n, outlines[n].frame), pages[n]);
   });
   progress.advance(1);
   return pages;

@@ -9,6 +9,7 @@
 #include "pagesweep/data/page.h"
 #include "pagesweep/data/page_surface.h"
 #include "pagesweep/data/picture.h"
+#include "pagesweep/dewarping/even_light.h"
 #include "pagesweep/dewarping/resample.h"
 
 namespace pagesweep {
@@ -19,6 +20,7 @@ struct DewarpOptions {
   bool deskew = true;
   bool crop = true;
   double margin_mm = 0;
+  Shading shading = Shading::even;
   ResampleOptions resampling{};
 
   template <class Visitor>
@@ -29,6 +31,8 @@ struct DewarpOptions {
     visit("deskew", deskew, "", "turn the page upright by its edges or its text lines");
     visit("crop", crop, "", "cut the page at the paper's edge");
     visit("margin", margin_mm, "mm", "keep that much of the table around a cropped page; negative: cut off more");
+    visit("shading", shading, "",
+          "even: divide out what slope, distance and the facing page do to the light; keep: leave it");
     resampling.describe(visit);
   }
 };
@@ -39,9 +43,11 @@ struct DewarpOptions {
 /// from s towards t by which its rightward direction was turned back: clockwise on the page is positive.
 ///
 /// \param surfaces  all pages of the scan, since one may hide part of another
+/// \param light     what is known of the light, for options.shading
 /// \throws std::invalid_argument  if the scan is not of the scanner's size, or an option is out of range
 /// \throws Error no_result        if the scan shows nothing of a page
 std::vector<Page> dewarp(std::span<const PageSurface> surfaces, const Picture& scan, const Scanner& scanner,
-                         const DewarpOptions& options = {}, Progress& progress = no_progress());
+                         const DewarpOptions& options = {}, Progress& progress = no_progress(),
+                         const ScanLight& light = {});
 
 }  // namespace pagesweep

@@ -72,8 +72,10 @@ double brightness_at(const Picture& scan, const Eigen::Vector2d& pixel) {
 FlatPreview make_flat_preview(const PaperView& view, const Picture& scan, double reach_mm) {
   const PageSurface& surface = view.surface();
   FlatPreview preview;
-  const double left = surface.s_of(0) - (surface.gutter_at_left ? 0 : reach_mm);
+  double left = surface.s_of(0) - (surface.gutter_at_left ? 0 : reach_mm);
   const double right = surface.s_of(surface.columns() - 1) + (surface.gutter_at_right ? 0 : reach_mm);
+  // Whole cells, up to the gutter exactly; what the last one is too wide goes to the other side.
+  if (surface.gutter_at_right) left = right - std::ceil((right - left) / preview.pitch_mm) * preview.pitch_mm;
   const double top = surface.t_of(0) - reach_mm, bottom = surface.t_of(surface.rows() - 1) + reach_mm;
   const double half = 0.5 * preview.pitch_mm;
   preview.s0_mm = left + half;

@@ -182,6 +182,8 @@ std::string lost_by_export(const Rig& rig) {
   std::vector<std::string_view> lost;
   if (rig.scanner) lost.emplace_back("scanner");
   if (rig.light) lost.emplace_back("light");
+  if (rig.lamp) lost.emplace_back("lamp");
+  if (rig.white) lost.emplace_back("white");
   if (std::ranges::any_of(rig.cameras, [](const Camera& camera) { return camera.sensor.has_value(); }))
     lost.emplace_back("sensors");
   return fmt::format("{}", fmt::join(lost, ", "));

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -143,6 +145,44 @@ Light read_light(const JsonReader& json) {
                                 not_zero(json.at("offset_per_frame"))});
 }
 
+LampBar read_lamp(const JsonReader& json) {
+  return {positive(json.at("height")), positive(json.at("length")), number_or_zero(json, "center")};
+}
+
+WhiteReference read_white(const JsonReader& json) {
+  constexpr int most = 1000;
+  WhiteReference white;
+  white.height_mm = number_or_zero(json, "height");
+  white.columns = json.at("columns").integer(2, most);
+  white.rows = json.at("rows").integer(2, most);
+  const JsonReader light = json.at("light");
+  for (const JsonReader& node : light.items()) {
+    std::array<float, 3>& values = white.light.emplace_back();
+    const auto channels = node.items();
+    if (channels.size() != values.size()) throw node.error("expected three numbers: red, green and blue");
+    std::transform(channels.begin(), channels.end(), values.begin(),
+                   [](const JsonReader& value) { return static_cast<float>(positive(value)); });
+  }
+  if (const int nodes = white.columns * white.rows; static_cast<int>(white.light.size()) != nodes)
+    throw light.error(fmt::format("expected columns x rows = {} nodes, found {}", nodes, white.light.size()));
+  return white;
+}
+
+ordered_json to_json(const LampBar& lamp) {
+  return {{"height", lamp.height_mm}, {"length", lamp.length_mm}, {"center", lamp.center_mm}};
+}
+
+ordered_json to_json(const WhiteReference& white) {
+  ordered_json json = {
+      {"height", white.height_mm}, {"columns", white.columns}, {"rows", white.rows}, {"light", ordered_json::array()}};
+  for (const auto& node : white.light) {
+    ordered_json values = ordered_json::array();
+    for (const float value : node) values.push_back(std::round(double(value) * 1e5) / 1e5);
+    json["light"].push_back(std::move(values));
+  }
+  return json;
+}
+
 ordered_json to_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 ordered_json to_json(const Eigen::Matrix3d& m) {
@@ -240,6 +280,8 @@ Rig read_rig(const std::filesystem::path& file) {
   if (rig.cameras.empty()) throw json.at("cameras").error("expected at least one camera");
   if (const auto scanner = json.find("scanner")) rig.scanner = read_scanner(*scanner);
   if (const auto light = json.find("light")) rig.light = read_light(*light);
+  if (const auto lamp = json.find("lamp")) rig.lamp = read_lamp(*lamp);
+  if (const auto white = json.find("white")) rig.white = read_white(*white);
   return rig;
 }
 
@@ -254,6 +296,8 @@ void write_rig(const std::filesystem::path& file, const Rig& rig) {
   const auto convert = [](const auto& model) { return to_json(model); };
   if (rig.scanner) json["scanner"] = std::visit(convert, rig.scanner->model());
   if (rig.light) json["light"] = std::visit(convert, rig.light->model());
+  if (rig.lamp) json["lamp"] = to_json(*rig.lamp);
+  if (rig.white) json["white"] = to_json(*rig.white);
   require_finite(json);
   write_json(file, json);
 }

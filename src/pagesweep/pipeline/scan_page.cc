@@ -239,6 +239,18 @@ std::vector<TimeMap> measure_at_the_end(FrameSource& source, Stage& stage, Measu
   return seen;
 }
 
+/// The light of the scan: the rig's, or the sheet of light as the cameras saw it.
+ScanLight light_of(const Measurement& measurement, const Rig& rig) {
+  ScanLight light{rig.light, rig.lamp, rig.white};
+  if (measurement.sweep) {
+    light.sheet = measurement.sweep->light;
+    if (measurement.timing)
+      light.stripe_fwhm_mm =
+          measurement.timing->profile.full_width_half_maximum() * std::abs(measurement.sweep->mm_per_frame);
+  }
+  return light;
+}
+
 }  // namespace
 
 Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& options, Progress& progress,
@@ -273,7 +285,7 @@ Scan flatten(Measurement measurement, const Picture& picture, const Rig& rig, co
   Scan scan;
   scan.measurement = std::move(measurement);
   scan.surfaces = fit_surface(scan.measurement.points, surface_options, progress);
-  scan.pages = dewarp(scan.surfaces, picture, *rig.scanner, options.dewarp, progress);
+  scan.pages = dewarp(scan.surfaces, picture, *rig.scanner, options.dewarp, progress, light_of(scan.measurement, rig));
   return scan;
 }
 

@@ -59,6 +59,41 @@ Json to_json(const Page& page) {
           {"measured_share", number(page.measured_share)}};
 }
 
+Json to_json(const Image<float>& values) {
+  Json json = Json::array();
+  for (const float value : values.pixels()) json.push_back(number(std::round(double(value) * 10) / 10));
+  return json;
+}
+
+Json to_json(const Mtf& mtf) {
+  Json json = Json::array();
+  for (const double value : mtf.values) json.push_back(number(std::round(value * 1e4) / 1e4));
+  return json;
+}
+
+Json to_json(const PageQuality& quality) {
+  Json json{{"verdict", std::string(name_of(quality.verdict))}, {"reasons", quality.reasons}};
+  for (const QualityFigure& figure : quality.figures) {
+    Json& entry = json["figures"][figure.figure.name];
+    entry = {{"value", number(figure.figure.value)}, {"unit", figure.figure.unit}};
+    if (!figure.fadgi.empty()) entry["fadgi"] = figure.fadgi;
+    if (!figure.iso.empty()) entry["iso_19264"] = figure.iso;
+    if (!figure.figure.reason.empty()) entry["reason"] = figure.figure.reason;
+  }
+  const ResolutionMap& map = quality.resolution;
+  json["resolution_map"] = {{"pitch_mm", map.pitch_mm},
+                            {"columns", map.across_dpi.width()},
+                            {"rows", map.across_dpi.height()},
+                            {"across_dpi", to_json(map.across_dpi)},
+                            {"down_dpi", to_json(map.down_dpi)}};
+  json["mtf"] = {{"cycles_per_px", Mtf{}.step},
+                 {"across", to_json(quality.sharpness[0].page)},
+                 {"down", to_json(quality.sharpness[1].page)},
+                 {"scan_across", to_json(quality.sharpness[0].scan)},
+                 {"scan_down", to_json(quality.sharpness[1].scan)}};
+  return json;
+}
+
 Json to_json(const Verdict& verdict) {
   Json remarks = Json::array();
   for (const std::string& remark : verdict.remarks) remarks.push_back(utf8(remark));
@@ -78,6 +113,8 @@ Json to_json(const ReportInputs& inputs, const Verdict& verdict) {
   for (const Page& page : inputs.pages) json["pages"].push_back(to_json(page));
   for (std::size_t i = 0; i < std::min(inputs.surfaces.size(), inputs.pages.size()); ++i)
     json["pages"][i]["model"] = utf8(inputs.surfaces[i].model_name);
+  for (std::size_t i = 0; i < std::min(inputs.quality.size(), inputs.pages.size()); ++i)
+    json["pages"][i]["quality"] = to_json(inputs.quality[i]);
   if (!inputs.profile.empty()) {
     Json& profile = json["stripe_profile"] = {{"time_frames", Json::array()}, {"light", Json::array()}};
     for (const ProfileSample& sample : inputs.profile) {

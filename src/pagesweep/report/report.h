@@ -17,6 +17,7 @@
 #include "pagesweep/data/picture.h"
 #include "pagesweep/data/point_map.h"
 #include "pagesweep/data/time_map.h"
+#include "pagesweep/quality/page_quality.h"
 #include "pagesweep/report/verdict.h"
 
 namespace pagesweep {
@@ -78,6 +79,7 @@ struct ReportInputs {
   std::vector<ProfileSample> profile;
   std::span<const PageSurface> surfaces;
   std::span<const Page> pages;
+  std::span<const PageQuality> quality;  ///< one a page, or none
   const Picture* scan = nullptr;
   bool pages_expected = true;  ///< false where only the surface was asked for
   std::vector<Figure> figures;

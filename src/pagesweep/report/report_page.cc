@@ -229,6 +229,55 @@ std::string format_cameras(const ReportInputs& inputs, const PictureEncoder& enc
   return html + format_row("wide", "<div>" + table + "</div>" + profile);
 }
 
+// Quality -------------------------------------------------------------------------------------------------------------
+
+std::string format_quality_table(const PageQuality& quality) {
+  std::string rows;
+  for (const QualityFigure& entry : quality.figures) {
+    const Figure& figure = entry.figure;
+    const std::string value =
+        std::isnan(figure.value)
+            ? "<span class=\"u\">" + escape_html(figure.reason) + "</span>"
+            : fmt::format("{} <span class=\"u\">{}</span>", format_number(figure.value), escape_html(figure.unit));
+    rows += fmt::format("<tr><td>{}</td><td class=\"n\">{}</td><td>{}</td><td>{}</td></tr>\n", escape_html(figure.what),
+                        value, escape_html(entry.fadgi), escape_html(entry.iso));
+  }
+  return "<table><tr><th></th><th class=\"n\"></th><th>FADGI</th><th>ISO 19264-1</th></tr>\n" + rows + "</table>\n";
+}
+
+std::string format_quality_maps(const PageQuality& quality, const PictureEncoder& encoder) {
+  const auto figure = [&](const Image<float>& values, Range range, const char* unit, const char* title,
+                          const char* caption) {
+    if (values.empty()) return std::string();
+    PictureFigure picture = map_figure(values, Ramp::sequential, range, unit, encoder);
+    picture.title = fmt::format("Page {}: {}", quality.index, title);
+    picture.caption = caption;
+    return format_figure(picture);
+  };
+  const ResolutionMap& map = quality.resolution;
+  const Range across = range_of(map.across_dpi), down = range_of(map.down_dpi);
+  const Range both{std::min(across.low, down.low), std::max(across.high, down.high)};
+  return format_row(
+      "four", figure(map.across_dpi, both, "dpi", "resolution along the lines.",
+                     "Pixels of the scan an inch of paper. Less than the page's own: the paper was seen at a slant.") +
+                  figure(map.down_dpi, both, "dpi", "resolution across the lines.", "The same from line to line.") +
+                  figure(quality.paper.levels, range_of(quality.paper.levels), "", "blank paper.",
+                         "Light of the paper between the letters: how evenly the page is lit."));
+}
+
+std::string format_quality(const ReportInputs& inputs, const PictureEncoder& encoder) {
+  std::string html;
+  for (const PageQuality& quality : inputs.quality) {
+    html += fmt::format("<h3>Page {}: {}</h3>\n", quality.index,
+                        quality.verdict == PageVerdict::good   ? "good"
+                        : quality.verdict == PageVerdict::look ? "deserves a look"
+                                                               : "scan it again");
+    for (const std::string& reason : quality.reasons) html += "<p>" + escape_html(reason) + ".</p>\n";
+    html += format_quality_maps(quality, encoder) + format_quality_table(quality);
+  }
+  return html;
+}
+
 // Tables --------------------------------------------------------------------------------------------------------------
 
 std::string format_value(const OptionValue& option) {
@@ -271,6 +320,11 @@ std::string format_report(const ReportInputs& inputs, const Verdict& verdict, co
   html += format_tiles(inputs);
   html += format_section("Pages", "Each page as the scanner saw it, and laid flat with the measured surface.",
                          format_pages(inputs, encoder));
+  html +=
+      format_section("Quality",
+                     "In the terms of FADGI (2023) and ISO 19264-1, as far as a page tells without a target. What each "
+                     "figure means and where the limits come from is in docs/quality.md.",
+                     format_quality(inputs, encoder));
   html +=
       format_section("Surface", "Every pixel of both cameras that saw the stripe pass gives one point of the paper.",
                      format_relief(inputs, encoder));

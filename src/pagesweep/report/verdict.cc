@@ -38,10 +38,22 @@ void worsen(Verdict& verdict, VerdictLevel level, std::string remark) {
   verdict.remarks.insert(place, std::move(remark));
 }
 
+/// A page's own verdict counts as it is; both know the same three levels.
+void judge_quality(std::span<const PageQuality> qualities, Verdict& verdict) {
+  for (const PageQuality& quality : qualities) {
+    if (quality.verdict == PageVerdict::good) continue;
+    std::string reasons;
+    for (const std::string& reason : quality.reasons) reasons += (reasons.empty() ? "" : "; ") + reason;
+    worsen(verdict, quality.verdict == PageVerdict::scan_again ? VerdictLevel::scan_again : VerdictLevel::look,
+           fmt::format("Page {}: {}.", quality.index, reasons));
+  }
+}
+
 void judge_pages(const ReportInputs& inputs, Verdict& verdict) {
   const VerdictOptions& limits = inputs.verdict;
   if (inputs.pages_expected && inputs.pages.empty())
     worsen(verdict, VerdictLevel::scan_again, "No page was found in what the cameras measured.");
+  if (!inputs.quality.empty()) return judge_quality(inputs.quality, verdict);
   for (const Page& page : inputs.pages) {
     const std::string what =
         fmt::format("Only {} of page {} rests on measured points", percent(page.measured_share), page.index);

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/dewarping/even_light.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "pagesweep/base/parallel.h"
+#include "pagesweep/data/transfer_curve.h"
+#include "pagesweep/dewarping/gutter_glow.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr double slope_reach_mm = 1.5;             // normals are taken over twice that
+constexpr double least_gain = 0.5, most_gain = 4;  // beyond, print would be noise
+constexpr double sample_pitch_mm = 8;              // of blank paper, where the lamp is looked for
+constexpr double paper_quantile = 0.85;            // of the light in a cell: paper between the lines
+constexpr double least_paper_light = 0.05;
+
+/// Where the scan's pixel sees the plane on which the scanner's white was measured.
+Eigen::Vector3d on_reference(const Scanner& scanner, const Eigen::Vector2d& pixel, const Eigen::Vector3d& point,
+                             double height_mm) {
+  const auto ray = scanner.ray(pixel);
+  if (!ray || !(std::abs(ray->direction.z()) > 1e-6)) return {point.x(), point.y(), height_mm};
+  return ray->origin + (height_mm - ray->origin.z()) / ray->direction.z() * ray->direction;
+}
+
+/// Light of the paper in a cell of the scan around a spot: bright, but not the brightest.
+double paper_light(const PaperView& view, const Picture& scan, const TransferCurve& curve,
+                   const Eigen::Vector2d& paper_mm) {
+  constexpr int steps = 10;
+  std::vector<double> lights;
+  for (int k = 0; k < steps * steps; ++k) {
+    const Eigen::Vector2d offset((k % steps + 0.5) / steps - 0.5, (k / steps + 0.5) / steps - 0.5);
+    const auto pixel = view.position(paper_mm + sample_pitch_mm * offset);
+    if (!pixel || !view.scanner().sees(*pixel)) return 0;
+    const int x = std::clamp(static_cast<int>(std::lround(pixel->x())), 0, scan.width() - 1);
+    const int y = std::clamp(static_cast<int>(std::lround(pixel->y())), 0, scan.height() - 1);
+    double sum = 0;
+    for (int c = 0; c < scan.channels; ++c) sum += double(curve.light_of(scan, x, y, c));
+    lights.push_back(sum / scan.channels);
+  }
+  const auto at = lights.begin() + static_cast<std::ptrdiff_t>(paper_quantile * double(lights.size()));
+  std::nth_element(lights.begin(), at, lights.end());
+  return *at;
+}
+
+/// Encodes light as samples: the inverse of a tone curve, from a table that is as fine as the samples need.
+class Encoder {
+ public:
+  Encoder(const TransferCurve& curve, int bit_depth) {
+    const int white = (1 << bit_depth) - 1;
+    // Even steps of the square root of light: steps of light are fine where the curve is steep.
+    for (int i = 0; i <= cells; ++i)
+      table_.push_back(static_cast<float>(curve.sample(std::pow(double(i) / cells, 2)) * white));
+  }
+  float operator()(float light) const {
+    const float place = std::sqrt(std::clamp(light, 0.0f, 1.0f)) * cells;
+    const int k = std::min(static_cast<int>(place), cells - 1);
+    const float* cell = &table_[static_cast<std::size_t>(k)];
+    return cell[0] + (place - static_cast<float>(k)) * (cell[1] - cell[0]);
+  }
+
+ private:
+  static constexpr int cells = 1 << 14;
+  std::vector<float> table_;
+};
+
+/// The gains of a row of pixels, one channel.
+void interpolate_row(const LightGain& gain, const Image<float>& values, int y, double pixels_per_mm,
+                     std::vector<float>& row) {
+  const auto per_px = static_cast<float>(1 / (pixels_per_mm * gain.pitch_mm));
+  const float v = (static_cast<float>(y) + 0.5f) * per_px;
+  const int j = std::clamp(static_cast<int>(v), 0, values.height() - 2);
+  const float b = v - static_cast<float>(j);
+  for (std::size_t x = 0; x < row.size(); ++x) {
+    const float u = (static_cast<float>(x) + 0.5f) * per_px;
+    const int i = std::clamp(static_cast<int>(u), 0, values.width() - 2);
+    const float a = u - static_cast<float>(i);
+    const float upper = values(i, j) + a * (values(i + 1, j) - values(i, j));
+    const float lower = values(i, j + 1) + a * (values(i + 1, j + 1) - values(i, j + 1));
+    row[x] = upper + b * (lower - upper);
+  }
+}
+
+}  // namespace
+
+struct PageLight::Spot {
+  bool seen = false;
+  Eigen::Vector3d point, normal, at_reference;
+  Eigen::Vector2d pixel;
+};
+
+PageLight::PageLight(std::span<const PaperView> views, const Picture& scan, const ScanLight& light)
+    : views_(views), scan_(scan), light_(light) {
+  if (!light_.lamp) light_.lamp = find_lamp(light_, sample_paper());
+}
+
+PageLight::Spot PageLight::spot_at(std::size_t page, const Eigen::Vector2d& paper_mm) const {
+  const PaperView& view = views_[page];
+  Spot spot;
+  spot.point = view.point(paper_mm);
+  // At the gutter the slope is that of this side.
+  const auto keep = [&](double s) {
+    const PageSurface& surface = view.surface();
+    return std::clamp(s, surface.s_of(0), surface.s_of(surface.columns() - 1));
+  };
+  const Eigen::Vector2d left(keep(paper_mm.x() - slope_reach_mm), paper_mm.y());
+  const Eigen::Vector2d right(keep(paper_mm.x() + slope_reach_mm), paper_mm.y());
+  const Eigen::Vector2d down(0, slope_reach_mm);
+  spot.normal = (view.point(paper_mm + down) - view.point(paper_mm - down)).cross(view.point(right) - view.point(left));
+  if (spot.normal.z() < 0) spot.normal = -spot.normal;
+  spot.normal.normalize();
+  const auto pixel = view.scanner().project(spot.point);
+  if (!pixel || !spot.normal.allFinite()) return spot;
+  spot.seen = true;
+  spot.pixel = *pixel;
+  spot.at_reference = on_reference(view.scanner(), *pixel, spot.point, light_.white ? light_.white->height_mm : 0);
+  return spot;
+}
+
+/// The page on the other side of the gutter.
+std::optional<std::size_t> PageLight::facing(std::size_t page) const {
+  const PageSurface& surface = views_[page].surface();
+  if (surface.gutter_at_right && page + 1 < views_.size() && views_[page + 1].surface().gutter_at_left) return page + 1;
+  if (surface.gutter_at_left && page > 0 && views_[page - 1].surface().gutter_at_right) return page - 1;
+  return std::nullopt;
+}
+
+std::vector<PaperSample> PageLight::sample_paper() const {
+  const TransferCurve curve = TransferCurve::of(scan_);
+  std::vector<PaperSample> samples;
+  for (std::size_t page = 0; page < views_.size(); ++page) {
+    const PageSurface& surface = views_[page].surface();
+    std::optional<GutterGlow> glow;
+    if (const auto other = facing(page)) glow.emplace(views_[page], views_[*other], scan_, light_);
+    const int columns = static_cast<int>((surface.columns() - 1) * surface.spacing_mm / sample_pitch_mm);
+    const int rows = static_cast<int>((surface.rows() - 1) * surface.spacing_mm / sample_pitch_mm);
+    std::vector<std::optional<PaperSample>> found(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+    parallel_rows(rows, [&](int j) {
+      for (int i = 0; i < columns; ++i) {
+        const Eigen::Vector2d paper(surface.s0_mm + (i + 0.5) * sample_pitch_mm,
+                                    surface.t0_mm + (j + 0.5) * sample_pitch_mm);
+        const auto a = static_cast<int>(std::lround((paper.x() - surface.s0_mm) / surface.spacing_mm));
+        const auto b = static_cast<int>(std::lround((paper.y() - surface.t0_mm) / surface.spacing_mm));
+        if (surface.status(a, b) != PixelStatus::ok) continue;
+        const Spot spot = spot_at(page, paper);
+        const double light = spot.seen ? paper_light(views_[page], scan_, curve, paper) : 0;
+        if (!(light > least_paper_light)) continue;
+        PaperSample sample{spot.point, spot.normal, spot.at_reference, 0, light, static_cast<int>(page)};
+        if (glow) {
+          const ChannelLight by_channel = glow->at(paper, spot.point, spot.normal);
+          sample.glow = (by_channel[0] + by_channel[1] + by_channel[2]) / 3;
+        }
+        found[static_cast<std::size_t>(j * columns + i)] = sample;
+      }
+    });
+    for (const auto& sample : found)
+      if (sample) samples.push_back(*sample);
+  }
+  return samples;
+}
+
+LightGain PageLight::gain(std::size_t page, const PageFrame& frame) const {
+  LightGain gain;
+  const int columns = std::max(2, static_cast<int>(std::ceil(frame.width_mm / gain.pitch_mm)) + 1);
+  const int rows = std::max(2, static_cast<int>(std::ceil(frame.height_mm / gain.pitch_mm)) + 1);
+  for (Image<float>& values : gain.values) values = Image<float>(columns, rows, 1.0f);
+  std::optional<GutterGlow> glow;
+  if (const auto other = facing(page)) glow.emplace(views_[page], views_[*other], scan_, light_);
+  const LampLight lamp(light_);
+  ChannelLight typical_white{1, 1, 1};
+  if (light_.white) typical_white = light_.white->at(0.5, 0.5);
+  parallel_rows(rows, [&](int j) {
+    for (int i = 0; i < columns; ++i) {
+      const Eigen::Vector2d paper = frame.paper_from_page({i * gain.pitch_mm, j * gain.pitch_mm});
+      const Spot spot = spot_at(page, paper);
+      if (!spot.seen) continue;
+      const double direct = lamp.at(spot.point, spot.normal, spot.at_reference);
+      const ChannelLight bounced = glow ? glow->at(paper, spot.point, spot.normal) : ChannelLight{};
+      ChannelLight white = typical_white;
+      if (light_.white)
+        white = light_.white->at(spot.pixel.x() / (scan_.width() - 1), spot.pixel.y() / (scan_.height() - 1));
+      for (std::size_t c = 0; c < 3; ++c)
+        gain.values[c](i, j) =
+            static_cast<float>(std::clamp(typical_white[c] / white[c] / (direct + bounced[c]), least_gain, most_gain));
+    }
+  });
+  return gain;
+}
+
+void apply_gain(const LightGain& gain, Page& page) {
+  Picture& picture = page.picture;
+  const TransferCurve curve = TransferCurve::of(picture);
+  const std::vector<float> light = curve.table(picture.bit_depth());
+  const Encoder encode(curve, picture.bit_depth());
+  std::visit(
+      [&]<class T>(Image<T>& samples) {
+        parallel_rows(picture.height(), [&](int y) {
+          std::vector<float> row(static_cast<std::size_t>(picture.width()));
+          for (int c = 0; c < picture.channels; ++c) {
+            interpolate_row(gain, gain.values[static_cast<std::size_t>(c)], y, picture.pixels_per_mm, row);
+            for (int x = 0; x < picture.width(); ++x) {
+              if (std::isnan(page.scan_map.u(x, y))) continue;
+              T& sample = samples(x * picture.channels + c, y);
+              sample = static_cast<T>(encode(light[sample] * row[static_cast<std::size_t>(x)]) + 0.5f);
+            }
+          }
+        });
+      },
+      picture.samples);
+}
+
+}  // namespace pagesweep

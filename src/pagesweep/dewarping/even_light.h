@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "pagesweep/base/enum_names.h"
+#include "pagesweep/data/page.h"
+#include "pagesweep/dewarping/lamp_light.h"
+#include "pagesweep/dewarping/page_frame.h"
+#include "pagesweep/dewarping/paper_view.h"
+
+namespace pagesweep {
+
+/// What becomes of the shading on a page.
+enum class Shading {
+  even,  ///< divided out: what slope, distance and the facing page do to the light
+  keep,  ///< left as the scan shows it
+};
+constexpr auto names_of(Shading) { return std::array<std::string_view, 2>{"even", "keep"}; }
+
+/// By how much the light of each spot of a page is to be multiplied to look as if it lay level on the table.
+struct LightGain {
+  double pitch_mm = 1;                 ///< of the grid, which begins at the page's corner
+  std::array<Image<float>, 3> values;  ///< red, green, blue
+};
+
+/// How paper lies in the light, page by page.
+class PageLight {
+ public:
+  /// \param views  all pages of the scan; kept, with `scan`, as references
+  PageLight(std::span<const PaperView> views, const Picture& scan, const ScanLight& light);
+
+  /// The lamp that is reckoned with: the rig's, or what the pages themselves show; nothing: light from afar.
+  const std::optional<LampBar>& lamp() const { return light_.lamp; }
+  LightGain gain(std::size_t page, const PageFrame& frame) const;
+
+ private:
+  struct Spot;
+  Spot spot_at(std::size_t page, const Eigen::Vector2d& paper_mm) const;
+  std::vector<PaperSample> sample_paper() const;
+  std::optional<std::size_t> facing(std::size_t page) const;
+
+  std::span<const PaperView> views_;
+  const Picture& scan_;
+  ScanLight light_;
+};
+
+/// Multiplies the page's light, sample by sample through the picture's tone curve. What the scan does not show is left
+/// alone.
+void apply_gain(const LightGain& gain, Page& page);
+
+}  // namespace pagesweep

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/dewarping/lamp_light.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "pagesweep/base/parallel.h"
+
+namespace pagesweep {
+namespace {
+
+constexpr double least_light = 1e-3;
+constexpr double tolerance = 0.02;     // by which the light of blank paper scatters, relative
+constexpr double least_relief_mm = 6;  // of heights, to tell how far the lamp is away
+constexpr double least_gain = 0.1;     // of the cost
+constexpr std::size_t least_samples = 100;
+
+Plane sheet_at(const ScanLight& light, const Eigen::Vector3d& point) {
+  if (light.sheet)
+    if (const auto time = light.sheet->time_of(point)) return light.sheet->plane_at(*time);
+  return {};
+}
+
+/// Integrals over the bar, x' from a to b: of 1 / (D^2 + x'^2)^2, and of x' / (D^2 + x'^2)^2.
+std::pair<double, double> bar_integrals(double distance, double a, double b) {
+  const double d2 = distance * distance;
+  const auto even = [&](double x) {
+    return x / (2 * d2 * (d2 + x * x)) + std::atan(x / distance) / (2 * d2 * distance);
+  };
+  const auto odd = [&](double x) { return -1 / (2 * (d2 + x * x)); };
+  return {even(b) - even(a), odd(b) - odd(a)};
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// How uneven blank paper is after the light is divided out: 0 not at all, 1 altogether. Each sheet's own brightness is
+/// free.
+double unevenness(const ScanLight& light, std::span<const PaperSample> samples) {
+  const LampLight lamp(light);
+  std::vector<double> logs;
+  std::map<int, std::vector<double>> by_sheet;
+  for (const PaperSample& sample : samples) {
+    const double received = lamp.at(sample.point_mm, sample.normal, sample.at_reference_mm) + sample.glow;
+    logs.push_back(std::log(sample.light / std::max(received, least_light)));
+    by_sheet[sample.sheet].push_back(logs.back());
+  }
+  std::map<int, double> levels;
+  for (const auto& [sheet, values] : by_sheet) levels[sheet] = median(values);
+  double cost = 0;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const double off = std::pow((logs[k] - levels[samples[k].sheet]) / tolerance, 2);
+    cost += off / (1 + off);
+  }
+  return cost / static_cast<double>(samples.size());
+}
+
+bool has_relief(std::span<const PaperSample> samples) {
+  std::vector<double> heights;
+  for (const PaperSample& sample : samples) heights.push_back(sample.point_mm.z());
+  std::ranges::sort(heights);
+  const auto at = [&](double share) { return heights[static_cast<std::size_t>(share * double(heights.size() - 1))]; };
+  return at(0.95) - at(0.05) > least_relief_mm;
+}
+
+}  // namespace
+
+LightFrame LampLight::frame_at(const Eigen::Vector3d& point_mm) const {
+  LightFrame frame;
+  frame.normal = sheet_at(*light_, point_mm).normal;
+  frame.along = frame.normal.cross(Eigen::Vector3d::UnitZ()).normalized();
+  frame.up = frame.along.cross(frame.normal).normalized();
+  if (frame.up.z() < 0) frame.up = -frame.up;
+  return frame;
+}
+
+double LampLight::irradiance(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+  const LightFrame frame = frame_at(point);
+  if (!light_->lamp) return std::max(least_light, normal.dot(frame.up));
+  const LampBar& bar = *light_->lamp;
+  const double distance = std::max(10.0, (bar.height_mm - point.z()) / frame.up.z());
+  const double middle = (bar.center_mm - point.dot(frame.along));
+  const auto [even, odd] = bar_integrals(distance, middle - 0.5 * bar.length_mm, middle + 0.5 * bar.length_mm);
+  return std::max(least_light * even, normal.dot(frame.up) * even + normal.dot(frame.along) * odd / distance) *
+         distance * distance;
+}
+
+double LampLight::at(const Eigen::Vector3d& point_mm, const Eigen::Vector3d& normal,
+                     const Eigen::Vector3d& at_reference_mm) const {
+  return irradiance(point_mm, normal) / irradiance(at_reference_mm, Eigen::Vector3d::UnitZ());
+}
+
+std::optional<LampBar> find_lamp(const ScanLight& light, std::span<const PaperSample> samples) {
+  if (samples.size() < least_samples || !has_relief(samples)) return std::nullopt;
+  constexpr std::array heights{200., 250., 300., 350., 400., 450., 500., 600., 700., 850., 1000., 1300., 2000., 4000.};
+  constexpr std::array lengths{50., 200., 300., 400., 500., 600., 800., 1200.};
+  std::vector<double> costs(heights.size() * lengths.size());
+  parallel_rows(static_cast<int>(costs.size()), [&](int k) {
+    const auto n = static_cast<std::size_t>(k);
+    ScanLight tried = light;
+    tried.lamp = LampBar{heights[n / lengths.size()], lengths[n % lengths.size()], 0};
+    costs[n] = unevenness(tried, samples);
+  });
+  const auto best = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+  if (!(costs[best] < (1 - least_gain) * unevenness(light, samples))) return std::nullopt;
+  return LampBar{heights[best / lengths.size()], lengths[best % lengths.size()], 0};
+}
+
+}  // namespace pagesweep
