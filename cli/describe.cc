@@ -133,6 +133,15 @@ Description describe_rig(const Rig& rig) {
     description.lines.push_back("  light: " + model_name(*rig.light));
     description.json["light"] = {{"model", model_name(*rig.light)}};
   }
+  if (rig.lamp) {
+    description.lines.push_back(
+        fmt::format("  lamp: {:g} mm high, {:g} mm long", rig.lamp->height_mm, rig.lamp->length_mm));
+    description.json["lamp"] = {{"height", rig.lamp->height_mm}, {"length", rig.lamp->length_mm}};
+  }
+  if (rig.white) {
+    description.lines.push_back(fmt::format("  white: {} x {} nodes", rig.white->columns, rig.white->rows));
+    description.json["white"] = {{"columns", rig.white->columns}, {"rows", rig.white->rows}};
+  }
   return description;
 }
 

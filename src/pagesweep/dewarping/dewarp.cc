@@ -73,6 +73,21 @@ Page make_page(const PaperView& view, const Occlusion& occlusion, const PageOutl
   return page;
 }
 
+/// Paints over what is not the page's own paper.
+void cover(const PaperView& view, const PageFrame& frame, const Picture& scan, const DewarpOptions& options,
+           Page& page) {
+  if (options.obstructions != Obstructions::keep) {
+    const Image<char> mask = find_obstructions(view.surface(), frame, page.picture.pixels_per_mm);
+    if (!mask.empty() && options.obstructions == Obstructions::fill)
+      cover_with_paper(mask, page);
+    else if (!mask.empty())
+      cover_with(mask, options.resampling.fill, page);
+  }
+  if (options.surroundings == Surroundings::mask)
+    if (const Image<char> mask = find_surroundings(view, scan, frame, page); !mask.empty())
+      cover_with(mask, options.resampling.fill, page);
+}
+
 }  // namespace
 
 std::vector<Page> dewarp(std::span<const PageSurface> surfaces, const Picture& scan, const Scanner& scanner,
@@ -97,6 +112,7 @@ std::vector<Page> dewarp(std::span<const PageSurface> surfaces, const Picture& s
     const auto n = static_cast<std::size_t>(k);
     pages[n] = make_page(views[n], occlusion, outlines[n], pixels_per_mm, scan, options.resampling);
     if (page_light) apply_gain(page_light->gain(n, outlines[n].frame), pages[n]);
+    cover(views[n], outlines[n].frame, scan, options, pages[n]);
   });
   progress.advance(1);
   return pages;

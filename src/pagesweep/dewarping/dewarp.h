@@ -10,6 +10,7 @@
 #include "pagesweep/data/page_surface.h"
 #include "pagesweep/data/picture.h"
 #include "pagesweep/dewarping/even_light.h"
+#include "pagesweep/dewarping/paper_mask.h"
 #include "pagesweep/dewarping/resample.h"
 
 namespace pagesweep {
@@ -20,6 +21,8 @@ struct DewarpOptions {
   bool deskew = true;
   bool crop = true;
   double margin_mm = 0;
+  Surroundings surroundings = Surroundings::keep;
+  Obstructions obstructions = Obstructions::keep;
   Shading shading = Shading::even;
   ResampleOptions resampling{};
 
@@ -31,6 +34,10 @@ struct DewarpOptions {
     visit("deskew", deskew, "", "turn the page upright by its edges or its text lines");
     visit("crop", crop, "", "cut the page at the paper's edge");
     visit("margin", margin_mm, "mm", "keep that much of the table around a cropped page; negative: cut off more");
+    visit("surroundings", surroundings, "",
+          "mask: paint over the table beside crooked edges and in torn corners; keep: leave it");
+    visit("obstructions", obstructions, "",
+          "fingers, clips, slips of paper: leave them, paint over them, or fill them with paper colour");
     visit("shading", shading, "",
           "even: divide out what slope, distance and the facing page do to the light; keep: leave it");
     resampling.describe(visit);

@@ -15,6 +15,8 @@ namespace {
 
 constexpr double slope_reach_mm = 1.5;             // normals are taken over twice that
 constexpr double least_gain = 0.5, most_gain = 4;  // beyond, print would be noise
+constexpr double crease_mm = 1;                    // beside the gutter, where light is taken to be what it is there
+constexpr int glow_step = 4;                       // rows of gains
 constexpr double sample_pitch_mm = 8;              // of blank paper, where the lamp is looked for
 constexpr double paper_quantile = 0.85;            // of the light in a cell: paper between the lines
 constexpr double least_paper_light = 0.05;
@@ -168,24 +170,44 @@ LightGain PageLight::gain(std::size_t page, const PageFrame& frame) const {
   const int columns = std::max(2, static_cast<int>(std::ceil(frame.width_mm / gain.pitch_mm)) + 1);
   const int rows = std::max(2, static_cast<int>(std::ceil(frame.height_mm / gain.pitch_mm)) + 1);
   for (Image<float>& values : gain.values) values = Image<float>(columns, rows, 1.0f);
+  const PageSurface& surface = views_[page].surface();
+  const auto paper_at = [&](int i, int j) {
+    Eigen::Vector2d paper = frame.paper_from_page({i * gain.pitch_mm, j * gain.pitch_mm});
+    if (surface.gutter_at_left) paper.x() = std::max(paper.x(), surface.s_of(0) + crease_mm);
+    if (surface.gutter_at_right) paper.x() = std::min(paper.x(), surface.s_of(surface.columns() - 1) - crease_mm);
+    return paper;
+  };
   std::optional<GutterGlow> glow;
   if (const auto other = facing(page)) glow.emplace(views_[page], views_[*other], scan_, light_);
   const LampLight lamp(light_);
   ChannelLight typical_white{1, 1, 1};
   if (light_.white) typical_white = light_.white->at(0.5, 0.5);
+  // Along the gutter the facing page's light hardly changes: every so-many-th row will do.
+  const int glow_rows = glow ? (rows + glow_step - 1) / glow_step + 1 : 0;
+  Image<ChannelLight> glows(columns, glow_rows, ChannelLight{});
+  parallel_rows(glow_rows, [&](int j) {
+    for (int i = 0; i < columns; ++i) {
+      const Eigen::Vector2d paper = paper_at(i, j * glow_step);
+      if (const Spot spot = spot_at(page, paper); spot.seen) glows(i, j) = glow->at(paper, spot.point, spot.normal);
+    }
+  });
+  const auto glow_at = [&](int i, int j, std::size_t c) {
+    if (!glow) return 0.0;
+    const int row = j / glow_step;
+    const double share = double(j % glow_step) / glow_step;
+    return (1 - share) * glows(i, row)[c] + share * glows(i, row + 1)[c];
+  };
   parallel_rows(rows, [&](int j) {
     for (int i = 0; i < columns; ++i) {
-      const Eigen::Vector2d paper = frame.paper_from_page({i * gain.pitch_mm, j * gain.pitch_mm});
-      const Spot spot = spot_at(page, paper);
+      const Spot spot = spot_at(page, paper_at(i, j));
       if (!spot.seen) continue;
       const double direct = lamp.at(spot.point, spot.normal, spot.at_reference);
-      const ChannelLight bounced = glow ? glow->at(paper, spot.point, spot.normal) : ChannelLight{};
       ChannelLight white = typical_white;
       if (light_.white)
         white = light_.white->at(spot.pixel.x() / (scan_.width() - 1), spot.pixel.y() / (scan_.height() - 1));
       for (std::size_t c = 0; c < 3; ++c)
-        gain.values[c](i, j) =
-            static_cast<float>(std::clamp(typical_white[c] / white[c] / (direct + bounced[c]), least_gain, most_gain));
+        gain.values[c](i, j) = static_cast<float>(
+            std::clamp(typical_white[c] / white[c] / (direct + glow_at(i, j, c)), least_gain, most_gain));
     }
   });
   return gain;

@@ -13,6 +13,8 @@ namespace pagesweep {
 namespace {
 
 constexpr double reach_mm = 150;        // beyond, a strip's share is below a thousandth
+constexpr double share_step_mm = 0.5;   // of the table
+constexpr double nearest_mm = 0.5;      // nearer, the direction of a node is noise
 constexpr double own_reach_mm = 3;      // nearer, the slope of the paper is noise
 constexpr double least_crossing = 0.9;  // cosine between the spine and the sheet's normal
 
@@ -66,9 +68,17 @@ double lit_share(double distance_mm, double sigma_mm) {
 }
 
 GutterGlow::GutterGlow(const PaperView& page, const PaperView& facing, const Picture& scan, const ScanLight& light)
-    : page_(page), facing_(facing), lamp_(light), sigma_mm_(light.stripe_fwhm_mm / 2.3548) {
+    : page_(page), facing_(facing), lamp_(light) {
+  for (double distance = 0; distance <= reach_mm + 2 * share_step_mm; distance += share_step_mm)
+    lit_shares_.push_back(lit_share(distance, light.stripe_fwhm_mm / 2.3548));
   const int reach = static_cast<int>(std::lround(0.5 * light.stripe_fwhm_mm / facing.surface().spacing_mm));
   sent_ = light_of_nodes(facing, scan, reach);
+}
+
+double GutterGlow::share_at(double distance_mm) const {
+  const double place = distance_mm / share_step_mm;
+  const auto k = std::min(static_cast<std::size_t>(place), lit_shares_.size() - 2);
+  return lit_shares_[k] + (place - static_cast<double>(k)) * (lit_shares_[k + 1] - lit_shares_[k]);
 }
 
 /// The row of nodes whose end at the gutter the sheet of light passes together with the point.
@@ -117,9 +127,9 @@ ChannelLight GutterGlow::at(const Eigen::Vector2d& paper_mm, const Eigen::Vector
   for (int i = gutter_column(facing_.surface()); i >= 0 && i < nodes.width(); i += step) {
     const double angle = angle_of(nodes(i, row), distance);
     if (distance > reach_mm || angle < -0.5 * std::numbers::pi) break;
-    if (!(angle < horizon)) continue;
+    if (distance < nearest_mm || !(angle < horizon)) continue;
     if (i != gutter_column(facing_.surface())) {
-      const double share = 0.5 * (std::sin(horizon) - std::sin(angle)) * lit_share(distance, sigma_mm_);
+      const double share = 0.5 * (std::sin(horizon) - std::sin(angle)) * share_at(distance);
       for (std::size_t c = 0; c < 3; ++c) glow[c] += share * static_cast<double>(sent_(i, row)[c]);
     }
     horizon = angle;

@@ -35,12 +35,13 @@ class GutterGlow {
                   const Eigen::Vector3d& normal) const;
 
  private:
+  double share_at(double distance_mm) const;
   int row_beside(const PaperView& view, const Eigen::Vector3d& point, const Eigen::Vector3d& sheet_normal) const;
 
   const PaperView& page_;
   const PaperView& facing_;
   LampLight lamp_;
-  double sigma_mm_;
+  std::vector<double> lit_shares_;    ///< by distance
   Image<std::array<float, 3>> sent_;  ///< by each node of the facing page
 };
 

@@ -41,16 +41,42 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// A spot of paper in the light, without the lamp: what does not change while lamps are tried.
+struct PlacedSpot {
+  double towards_up, towards_along;  // of its normal
+  double height_mm, along_mm, rise;  // rise: of the direction up
+
+  PlacedSpot(const LightFrame& frame, const Eigen::Vector3d& point, const Eigen::Vector3d& normal)
+      : towards_up(normal.dot(frame.up)),
+        towards_along(normal.dot(frame.along)),
+        height_mm(point.z()),
+        along_mm(point.dot(frame.along)),
+        rise(frame.up.z()) {}
+
+  double irradiance(const LampBar& bar) const {
+    const double distance = std::max(10.0, (bar.height_mm - height_mm) / rise);
+    const double middle = bar.center_mm - along_mm;
+    const auto [even, odd] = bar_integrals(distance, middle - 0.5 * bar.length_mm, middle + 0.5 * bar.length_mm);
+    return std::max(least_light * even, towards_up * even + towards_along * odd / distance) * distance * distance;
+  }
+};
+
+struct PlacedSample {
+  PlacedSpot spot, reference;
+};
+
 /// How uneven blank paper is after the light is divided out: 0 not at all, 1 altogether. Each sheet's own brightness is
-/// free.
-double unevenness(const ScanLight& light, std::span<const PaperSample> samples) {
-  const LampLight lamp(light);
+/// free. Without a bar, light comes from afar.
+double unevenness(const std::optional<LampBar>& bar, std::span<const PaperSample> samples,
+                  std::span<const PlacedSample> places) {
   std::vector<double> logs;
   std::map<int, std::vector<double>> by_sheet;
-  for (const PaperSample& sample : samples) {
-    const double received = lamp.at(sample.point_mm, sample.normal, sample.at_reference_mm) + sample.glow;
-    logs.push_back(std::log(sample.light / std::max(received, least_light)));
-    by_sheet[sample.sheet].push_back(logs.back());
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const auto& [spot, reference] = places[k];
+    const double direct =
+        bar ? spot.irradiance(*bar) / reference.irradiance(*bar) : spot.towards_up / reference.towards_up;
+    logs.push_back(std::log(samples[k].light / std::max(direct + samples[k].glow, least_light)));
+    by_sheet[samples[k].sheet].push_back(logs.back());
   }
   std::map<int, double> levels;
   for (const auto& [sheet, values] : by_sheet) levels[sheet] = median(values);
@@ -82,14 +108,8 @@ LightFrame LampLight::frame_at(const Eigen::Vector3d& point_mm) const {
 }
 
 double LampLight::irradiance(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
-  const LightFrame frame = frame_at(point);
-  if (!light_->lamp) return std::max(least_light, normal.dot(frame.up));
-  const LampBar& bar = *light_->lamp;
-  const double distance = std::max(10.0, (bar.height_mm - point.z()) / frame.up.z());
-  const double middle = (bar.center_mm - point.dot(frame.along));
-  const auto [even, odd] = bar_integrals(distance, middle - 0.5 * bar.length_mm, middle + 0.5 * bar.length_mm);
-  return std::max(least_light * even, normal.dot(frame.up) * even + normal.dot(frame.along) * odd / distance) *
-         distance * distance;
+  const PlacedSpot spot(frame_at(point), point, normal);
+  return light_->lamp ? spot.irradiance(*light_->lamp) : std::max(least_light, spot.towards_up);
 }
 
 double LampLight::at(const Eigen::Vector3d& point_mm, const Eigen::Vector3d& normal,
@@ -101,16 +121,21 @@ std::optional<LampBar> find_lamp(const ScanLight& light, std::span<const PaperSa
   if (samples.size() < least_samples || !has_relief(samples)) return std::nullopt;
   constexpr std::array heights{200., 250., 300., 350., 400., 450., 500., 600., 700., 850., 1000., 1300., 2000., 4000.};
   constexpr std::array lengths{50., 200., 300., 400., 500., 600., 800., 1200.};
+  const LampLight from_afar(light);
+  std::vector<PlacedSample> places;
+  for (const PaperSample& sample : samples)
+    places.push_back({{from_afar.frame_at(sample.point_mm), sample.point_mm, sample.normal},
+                      {from_afar.frame_at(sample.at_reference_mm), sample.at_reference_mm, Eigen::Vector3d::UnitZ()}});
+  const auto bar_of = [&](std::size_t k) {
+    return LampBar{heights[k / lengths.size()], lengths[k % lengths.size()], 0};
+  };
   std::vector<double> costs(heights.size() * lengths.size());
   parallel_rows(static_cast<int>(costs.size()), [&](int k) {
-    const auto n = static_cast<std::size_t>(k);
-    ScanLight tried = light;
-    tried.lamp = LampBar{heights[n / lengths.size()], lengths[n % lengths.size()], 0};
-    costs[n] = unevenness(tried, samples);
+    costs[static_cast<std::size_t>(k)] = unevenness(bar_of(static_cast<std::size_t>(k)), samples, places);
   });
   const auto best = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
-  if (!(costs[best] < (1 - least_gain) * unevenness(light, samples))) return std::nullopt;
-  return LampBar{heights[best / lengths.size()], lengths[best % lengths.size()], 0};
+  if (!(costs[best] < (1 - least_gain) * unevenness(std::nullopt, samples, places))) return std::nullopt;
+  return bar_of(best);
 }
 
 }  // namespace pagesweep

@@ -12,10 +12,10 @@ namespace pagesweep {
 
 /// What is known of the light in which a scan was taken. All of it may be missing.
 struct ScanLight {
-  std::optional<Light> sheet;  ///< missing: upright, across the rig's y axis
-  std::optional<LampBar> lamp;
-  std::optional<WhiteReference> white;  ///< missing: the scanner has evened its picture out over the table, z = 0
-  double stripe_fwhm_mm = 12;           ///< width of the lit stripe on the table
+  std::optional<Light> sheet{};  ///< missing: upright, across the rig's y axis
+  std::optional<LampBar> lamp{};
+  std::optional<WhiteReference> white{};  ///< missing: the scanner has evened its picture out over the table, z = 0
+  double stripe_fwhm_mm = 12;             ///< width of the lit stripe on the table
 };
 
 /// The directions of light at a place: unit vectors of the rig frame.

@@ -116,6 +116,9 @@ Image<char> find_paper(const FlatPreview& preview, const Image<float>& cells, do
       pieces.push_back(std::move(piece));
     }
   std::size_t largest = 0;
+  // Of other sheets beside the page nothing was measured for this one.
+  if (std::ranges::any_of(pieces, [](const Piece& piece) { return piece.measured > 0; }))
+    std::erase_if(pieces, [](const Piece& piece) { return piece.measured == 0; });
   for (const Piece& piece : pieces) largest = std::max(largest, piece.cells.size());
   for (const Piece& piece : pieces)
     if (10 * piece.cells.size() > largest || 2 * piece.measured > piece.cells.size())

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <limits>
 
+#include "pagesweep/io/atomic_file.h"
 #include "pagesweep/io/files_testing.h"
 
 namespace pagesweep {
@@ -92,6 +93,26 @@ TEST(RigFile, KeepsTheSensorOfACameraThatHasOne) {
   EXPECT_EQ(back.cameras[1].sensor->gain, 0.025);
   EXPECT_EQ(back.cameras[1].sensor->read_noise, 1.2);
   EXPECT_EQ(back.cameras[1].sensor->psf_sigma_px, 0.7);
+}
+
+TEST(RigFile, KeepsTheLampAndTheWhiteReference) {
+  const TestFolder folder;
+  Rig rig;
+  rig.cameras = {some_camera("cam1")};
+  rig.lamp = LampBar{612.5, 540, -3};
+  rig.white = WhiteReference{1.5, 2, 3, std::vector<std::array<float, 3>>(6, {0.5f, 0.75f, 0.25f})};
+  write_rig(folder / "rig.json", rig);
+  const Rig back = read_rig(folder / "rig.json");
+  ASSERT_TRUE(back.lamp && back.white);
+  EXPECT_EQ(back.lamp->height_mm, 612.5);
+  EXPECT_EQ(back.lamp->length_mm, 540);
+  EXPECT_EQ(back.lamp->center_mm, -3);
+  EXPECT_EQ(back.white->height_mm, 1.5);
+  EXPECT_EQ(back.white->rows, 3);
+  EXPECT_EQ(back.white->light, rig.white->light);
+  std::string text = read_bytes(folder / "rig.json", 1 << 20);
+  write_bytes(folder / "rig.json", replaced(text, "\"rows\": 3", "\"rows\": 4"));
+  EXPECT_THAT(error_of([&] { read_rig(folder / "rig.json"); }), HasSubstr("white.light"));
 }
 
 TEST(RigFile, WritesNoNumberThatIsNotFinite) {

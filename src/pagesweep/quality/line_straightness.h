@@ -11,7 +11,7 @@ struct LineStraightness {
   double rms_mm = 0;             ///< of the baselines from the straight line through each
   double largest_in_100_mm = 0;  ///< deviation within 100 mm of a line, smoothed over three letters' widths; 95 % of
                                  ///< the windows keep it [mm]
-  double skew_rad = 0;  ///< median direction, from right towards down
+  double skew_rad = 0;           ///< median direction, from right towards down
 };
 
 /// A baseline is where the ink of a line falls off at its lower side, strip by strip of 6 mm, followed along the line.

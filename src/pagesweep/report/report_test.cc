@@ -177,6 +177,28 @@ TEST_F(ReportTest, JsonTellsTheSame) {
   EXPECT_EQ(report["figures"]["stripe"]["speed"]["reason"], "the rig does not tell");
 }
 
+TEST_F(ReportTest, TellsEachPagesQualityAndItsVerdict) {
+  Book book;
+  std::vector<PageQuality> quality(2);
+  quality[1].index = 2;
+  quality[1].verdict = PageVerdict::scan_again;
+  quality[1].reasons = {"print is blurred along the lines"};
+  quality[1].figures = {{{"page_2", "noise", "of blank paper", 1.7, "L*", ""}, "3 stars", "B"},
+                        {{"page_2", "mtf10_across", "a tenth", NAN, "lines/mm", "no edges"}, "", ""}};
+  book.inputs.quality = quality;
+  write_report(folder_, book.inputs);
+  const auto page = json()["pages"][1]["quality"];
+  EXPECT_EQ(page["verdict"], "scan_again");
+  EXPECT_EQ(page["reasons"][0], "print is blurred along the lines");
+  EXPECT_EQ(page["figures"]["noise"]["fadgi"], "3 stars");
+  EXPECT_EQ(page["figures"]["noise"]["iso_19264"], "B");
+  EXPECT_TRUE(page["figures"]["mtf10_across"]["value"].is_null());
+  EXPECT_EQ(page["figures"]["mtf10_across"]["reason"], "no edges");
+  EXPECT_EQ(judge(book.inputs).level, VerdictLevel::scan_again);
+  EXPECT_THAT(judge(book.inputs).remarks.at(0), HasSubstr("Page 2: print is blurred"));
+  EXPECT_THAT(read_bytes(folder_ / "report.html", 1 << 24), HasSubstr("scan it again"));
+}
+
 TEST_F(ReportTest, HostileTextStaysText) {
   Book book;
   const std::string attack = "\"><script>alert(1)</script><!-- evaluation begins -->\xff\x01";

@@ -83,8 +83,9 @@ class Pieces {
         if (label_(i, j) < 0 && is_inner(i, j)) grow(i, j);
   }
 
-  Image<std::uint8_t> choose_paper() {
-    choose_bright_pieces();
+  /// \param times_smaller  than the largest bright piece another one may be
+  Image<std::uint8_t> choose_paper(std::size_t times_smaller) {
+    choose_bright_pieces(times_smaller);
     for (Piece& piece : pieces_)
       if (!piece.bright) look_at_rim(piece);
     for (Piece& piece : pieces_)
@@ -164,7 +165,7 @@ class Pieces {
   }
 
   /// The largest bright piece and what is comparable to it, but not a level ground well below it.
-  void choose_bright_pieces() {
+  void choose_bright_pieces(std::size_t times_smaller) {
     const Piece* largest = nullptr;
     for (const Piece& piece : pieces_)
       if (piece.bright && (!largest || piece.cells.size() > largest->cells.size())) largest = &piece;
@@ -177,7 +178,8 @@ class Pieces {
         largest = &piece;
     for (Piece& piece : pieces_) {
       const bool below = is_ground(piece) && piece.middle_z < largest->lower_z - table_depth_mm;
-      piece.paper = piece.bright && piece.cells.size() * 10 >= largest->cells.size() && (!below || &piece == largest);
+      piece.paper =
+          piece.bright && piece.cells.size() * times_smaller >= largest->cells.size() && (!below || &piece == largest);
     }
   }
 
@@ -257,14 +259,14 @@ void trim_mixed_cells(Image<std::uint8_t>& paper, const Image<std::uint8_t>& mea
 
 }  // namespace
 
-Image<std::uint8_t> find_paper(const HeightField& field) {
+Image<std::uint8_t> find_paper(const HeightField& field, bool small_sheets) {
   Image<std::uint8_t> measured(field.columns(), field.rows(), 0), bright = measured;
   for (std::size_t k = 0; k < measured.size(); ++k) measured.data()[k] = std::isfinite(field.z.data()[k]);
   const int reach = std::max(1, static_cast<int>(std::lround(print_mm / field.cell_mm)));
   const Image<float> ground = close_print(field.intensity, reach);
   const double threshold = split_brightness(ground, measured);
   for (std::size_t k = 0; k < bright.size(); ++k) bright.data()[k] = !(ground.data()[k] < threshold);
-  Image<std::uint8_t> paper = Pieces(field, measured, bright).choose_paper();
+  Image<std::uint8_t> paper = Pieces(field, measured, bright).choose_paper(small_sheets ? 100 : 10);
   trim_mixed_cells(paper, measured);
   return paper;
 }

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -10,6 +11,7 @@
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/surfacing/find_gutter.h"
+#include "pagesweep/surfacing/find_items.h"
 #include "pagesweep/surfacing/find_paper.h"
 #include "pagesweep/surfacing/lay_flat.h"
 
@@ -19,6 +21,10 @@ namespace {
 constexpr double smallest_kink = 0.15;  // change of slope below which two pages do not fix the line where they meet
 constexpr double largest_correction_mm = 4;
 constexpr double many_outliers = 0.25;
+constexpr double nearest_to_gutter_mm = 0.2;
+/// Beside the gutter a pixel sees both pages, and its point lies between them: above the crease. A cell is about two
+/// pixels wide.
+constexpr double mixed_cells = 0.5;
 
 void check(std::span<const PointMap> cameras, const SurfaceOptions& options) {
   if (cameras.empty()) throw std::invalid_argument("fit_surface: at least one camera's points are needed");
@@ -123,13 +129,13 @@ std::vector<FittedPage> fit_both_pages(const HeightField& field, const Image<std
     const auto pages = fit(gap_mm, false);
     gutter = meeting_line(pages[0].model, pages[1].model, gutter);
   }
-  return fit(0.2, true);
+  return fit(std::max(nearest_to_gutter_mm, mixed_cells * field.cell_mm), true);
 }
 
 /// A gutter, if the layout is a spread or turns out to be one.
 std::optional<RulingFrame> choose_gutter(const HeightField& field, const Image<std::uint8_t>& paper, Layout layout,
                                          Progress& progress) {
-  if (layout == Layout::single) return std::nullopt;
+  if (layout == Layout::single || layout == Layout::items) return std::nullopt;
   if (const auto gutter = find_gutter(field, paper, layout == Layout::spread)) return frame_of(*gutter);
   if (layout == Layout::automatic) return std::nullopt;
   progress.warn("no gutter was found: the paper is divided in its middle");
@@ -161,15 +167,19 @@ std::vector<PageSurface> fit_surface(std::span<const PointMap> cameras, const Su
       smooth_points(cameras, {options.neighbourhood_mm, 0, options.reading_direction_rad}, progress);
   if (static_cast<double>(field.outliers) > many_outliers * static_cast<double>(field.points))
     progress.warn(fmt::format("{} of {} points lie off the surface around them", field.outliers, field.points));
-  const Image<std::uint8_t> paper = find_paper(field);
+  const Image<std::uint8_t> paper = find_paper(field, options.layout == Layout::items);
   const auto gutter = choose_gutter(field, paper, options.layout, progress);
   progress.advance(0.5);
 
   std::vector<FittedPage> fitted;
-  if (gutter)
+  if (options.layout == Layout::items)
+    for (const Image<std::uint8_t>& item : find_items(field, paper))
+      fitted.push_back(fit_page(field, cells_of(field, item), GutterSide::none, std::nullopt, true, options));
+  else if (gutter)
     fitted = fit_both_pages(field, paper, *gutter, options);
   else
     fitted.push_back(fit_page(field, cells_of(field, paper), GutterSide::none, std::nullopt, true, options));
+  if (fitted.empty()) throw no_result("no sheet of paper was found among the points");
   progress.advance(0.75);
 
   std::vector<PageSurface> pages(fitted.size());

@@ -22,8 +22,9 @@ enum class Layout {
   automatic,  ///< a spread if there is a gutter, else a single page
   single,     ///< one page
   spread,     ///< two pages with a gutter between them
+  items,      ///< several sheets lying apart, each its own page
 };
-constexpr auto names_of(Layout) { return std::array<std::string_view, 3>{"automatic", "single", "spread"}; }
+constexpr auto names_of(Layout) { return std::array<std::string_view, 4>{"automatic", "single", "spread", "items"}; }
 
 struct SurfaceOptions {
   SurfaceModel model = SurfaceModel::cylinder;
@@ -36,7 +37,8 @@ struct SurfaceOptions {
   void describe(Visitor&& visit) {
     visit("surface-model", model, "",
           "cylinder: straight lines along the spine; developable: the measured surface itself");
-    visit("layout", layout, "", "one page, two pages, or decided by whether there is a gutter");
+    visit("layout", layout, "",
+          "one page, two pages, several sheets lying apart, or one or two decided by whether there is a gutter");
     visit("smoothing", smoothing, "", "multiplies the stiffness of the cut profile that suits the noise");
     visit("neighbourhood", neighbourhood_mm, "mm", "radius within which points are averaged to follow dents");
     visit("reading-direction", reading_direction_rad, "rad",
@@ -44,8 +46,8 @@ struct SurfaceOptions {
   }
 };
 
-/// The page surfaces in the points of all cameras, from left to right, and their flattening:
-/// docs/derivations/surfacing.md.
+/// The page surfaces in the points of all cameras, from left to right (sheets lying apart: in reading order), and their
+/// flattening: docs/derivations/surfacing.md.
 ///
 /// Seen from above, with the reading direction to the right, the pages are not mirrored. A page ends at the gutter; on
 /// its other sides the grid reaches 8 mm beyond the measured paper. (s, t) = (0, 0) is the upper left corner of the
