@@ -168,7 +168,7 @@ TEST(EvenLight, SlopeAndDistanceAreDividedOutAndPrintIsKept) {
   EXPECT_NEAR(even.picture.width() / even.picture.pixels_per_mm, Lit::width, 0.3);
   EXPECT_NEAR(even.picture.height() / even.picture.pixels_per_mm, Lit::height, 0.3);
   const auto [after, after_dark] = Lit::errors(even);
-  EXPECT_GT(before, 0.2);
+  EXPECT_GT(before, 0.15);
   // A gray value of 8 bit is 0.9 % of the paper's light and 2 % of the dark field's.
   EXPECT_LT(after, 0.015);
   EXPECT_LT(after_dark, 0.025);
@@ -183,7 +183,8 @@ TEST(EvenLight, TheLampIsFoundFromThePaperIfTheRigDoesNotKnowIt) {
       low = std::min(low, light_at(page, x, y));
       high = std::max(high, light_at(page, x, y));
     }
-  EXPECT_GT(low / high, 0.97);
+  // Before it is 0.65. Lamps are tried in steps, and this page is too small to tell its length: 2 %; rounding: 1 %.
+  EXPECT_GT(low / high, 0.96);
 }
 
 TEST(EvenLight, ALevelPageStaysAsItIsToTheLastBit) {

@@ -22,9 +22,8 @@ constexpr double smallest_kink = 0.15;  // change of slope below which two pages
 constexpr double largest_correction_mm = 4;
 constexpr double many_outliers = 0.25;
 constexpr double nearest_to_gutter_mm = 0.2;
-/// Beside the gutter a pixel sees both pages, and its point lies between them: above the crease. A cell is about two
-/// pixels wide.
-constexpr double mixed_cells = 0.5;
+constexpr double mixed_cells = 1;       // beside the gutter: as far as the spot of a pixel reaches
+constexpr double least_lift_mm = 0.01;  // of points there, by which they are known to lie between the pages
 
 void check(std::span<const PointMap> cameras, const SurfaceOptions& options) {
   if (cameras.empty()) throw std::invalid_argument("fit_surface: at least one camera's points are needed");
@@ -112,6 +111,30 @@ RulingFrame meeting_line(const RuledSurface& left, const RuledSurface& right, co
   return {gutter.plan_from_ruling(shift, 0), gutter.angle_rad - std::atan(turn), 0};
 }
 
+/// How far the points beside the gutter, up to `gap_mm` from it, lie above the pages that were fitted without them
+/// [mm]. Where a pixel's spot sees both pages, its point lies between them, above the crease.
+double lift_at_gutter(const HeightField& field, const Image<std::uint8_t>& paper, const std::vector<FittedPage>& pages,
+                      const RulingFrame& gutter, double gap_mm) {
+  std::vector<double> lifts;
+  for (const FittedPage& page : pages) {
+    const Eigen::Vector2d outwards =
+        page.gutter == GutterSide::left ? gutter.across() : Eigen::Vector2d(-gutter.across());
+    for (int j = 0; j < field.rows(); ++j)
+      for (int i = 0; i < field.columns(); ++i) {
+        if (!paper(i, j)) continue;
+        for (const PlanPoint& point : field.surface_points(i, j)) {
+          const double distance = outwards.dot(Eigen::Vector2d(point.p, point.q) - gutter.origin);
+          if (distance > nearest_to_gutter_mm && distance < gap_mm)
+            lifts.push_back(point.z - page.model.height({point.p, point.q}));
+        }
+      }
+  }
+  if (lifts.empty()) return 0;
+  const auto middle = lifts.begin() + static_cast<std::ptrdiff_t>(lifts.size() / 2);
+  std::nth_element(lifts.begin(), middle, lifts.end());
+  return *middle;
+}
+
 /// The gutter is where the pages meet, and the pages are what ends at the gutter: from coarse to fine. Until it is
 /// known, parallel rulings will do.
 std::vector<FittedPage> fit_both_pages(const HeightField& field, const Image<std::uint8_t>& paper, RulingFrame gutter,
@@ -129,7 +152,10 @@ std::vector<FittedPage> fit_both_pages(const HeightField& field, const Image<std
     const auto pages = fit(gap_mm, false);
     gutter = meeting_line(pages[0].model, pages[1].model, gutter);
   }
-  return fit(std::max(nearest_to_gutter_mm, mixed_cells * field.cell_mm), true);
+  // What lies between the pages would round the crease, and cost each of them some of its width.
+  const double mixed_mm = mixed_cells * field.cell_mm;
+  const double lift = lift_at_gutter(field, paper, fit(mixed_mm, false), gutter, mixed_mm);
+  return fit(lift > least_lift_mm ? mixed_mm : nearest_to_gutter_mm, true);
 }
 
 /// A gutter, if the layout is a spread or turns out to be one.
