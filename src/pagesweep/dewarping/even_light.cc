@@ -16,6 +16,7 @@ namespace {
 constexpr double slope_reach_mm = 1.5;             // normals are taken over twice that
 constexpr double least_gain = 0.5, most_gain = 4;  // beyond, print would be noise
 constexpr double crease_mm = 1;                    // beside the gutter, where light is taken to be what it is there
+constexpr double rim_mm = 3;                       // likewise at the free edges
 constexpr int glow_step = 4;                       // rows of gains
 constexpr double sample_pitch_mm = 8;              // of blank paper, where the lamp is looked for
 constexpr double paper_quantile = 0.85;            // of the light in a cell: paper between the lines
@@ -69,6 +70,12 @@ class Encoder {
   static constexpr int cells = 1 << 14;
   std::vector<float> table_;
 };
+
+/// A place along a side of the page, moved away from its free ends: the last measured slopes there are noisy.
+double inside(double place_mm, double length_mm, bool gutter_first, bool gutter_last) {
+  const double rim = std::min(rim_mm, 0.25 * length_mm);
+  return std::clamp(place_mm, gutter_first ? 0 : rim, length_mm - (gutter_last ? 0 : rim));
+}
 
 /// The gains of a row of pixels, one channel.
 void interpolate_row(const LightGain& gain, const Image<float>& values, int y, double pixels_per_mm,
@@ -172,7 +179,9 @@ LightGain PageLight::gain(std::size_t page, const PageFrame& frame) const {
   for (Image<float>& values : gain.values) values = Image<float>(columns, rows, 1.0f);
   const PageSurface& surface = views_[page].surface();
   const auto paper_at = [&](int i, int j) {
-    Eigen::Vector2d paper = frame.paper_from_page({i * gain.pitch_mm, j * gain.pitch_mm});
+    Eigen::Vector2d paper = frame.paper_from_page(
+        {inside(i * gain.pitch_mm, frame.width_mm, surface.gutter_at_left, surface.gutter_at_right),
+         inside(j * gain.pitch_mm, frame.height_mm, false, false)});
     if (surface.gutter_at_left) paper.x() = std::max(paper.x(), surface.s_of(0) + crease_mm);
     if (surface.gutter_at_right) paper.x() = std::min(paper.x(), surface.s_of(surface.columns() - 1) - crease_mm);
     return paper;
