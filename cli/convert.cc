@@ -51,7 +51,7 @@ void run(const Arguments& arguments) {
 void add_convert_command(CLI::App& app) {
   auto* command = app.add_subcommand("convert", R"(Copy a capture, with its frames stored in another way.
 
-Nothing is lost: gray values, dropped frames, exposures and notes stay what they are; the rig, the
+Nothing is lost unless --drop or --lose say so: gray values, dropped frames, exposures and notes stay what they are; the rig, the
 scan and the folder truth/ are copied as they are. A recording is one file a camera, larger than
 PNGs and read many times faster. The output folder has to be new or empty.
 )");
@@ -63,6 +63,7 @@ PNGs and read many times faster. The output folder has to be new or empty.
   command->footer(R"(Examples:
   pagesweep convert capture -o fast                      # to be measured again and again
   pagesweep convert fast -o archive --format png         # to be kept
+  pagesweep convert capture -o poor --drop 0.1           # what one frame in ten lost would cost
 )");
   command->callback([arguments] { run(*arguments); });
 }

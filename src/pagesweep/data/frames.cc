@@ -37,13 +37,24 @@ int Frames::dropped() const {
   return static_cast<int>(std::count_if(images_.begin(), images_.end(), [](const auto& image) { return !image; }));
 }
 
-void Frames::set(int i, GrayImage image) {
+void Frames::set(int i, GrayImage image, float late) {
   if (i < 0 || i >= count()) throw std::invalid_argument("Frames::set: no such frame");
   if (width_of(image) != width() || height_of(image) != height())
     throw std::invalid_argument("Frames::set: the frame's size is not the sequence's");
   if (std::holds_alternative<Image<std::uint8_t>>(image) != sequence_.is_8_bit())
     throw std::invalid_argument("Frames::set: the frame's depth is not the sequence's");
   images_[static_cast<std::size_t>(i)] = std::move(image);
+  if (late != 0 && late_.empty()) late_.assign(images_.size(), 0);
+  if (!late_.empty()) late_[static_cast<std::size_t>(i)] = late;
+}
+
+void Frames::end_at(int count) {
+  if (count < 0 || count > this->count()) throw std::invalid_argument("Frames::end_at: there are not that many");
+  const auto size = static_cast<std::size_t>(count);
+  sequence_.count = count;
+  images_.resize(size);
+  if (!late_.empty()) late_.resize(size);
+  if (!sequence_.exposures.empty()) sequence_.exposures.resize(size);
 }
 
 bool Frames::read_row(int y, Image<float>& samples) const {
@@ -108,9 +119,10 @@ std::vector<Frames> read_all(FrameSource& source, Progress& progress) {
   progress.begin("reading frames");
   while (auto set = source.next()) {
     for (std::size_t c = 0; c < cameras.size(); ++c)
-      if (set->images[c]) cameras[c].set(set->index, std::move(*set->images[c]));
+      if (set->images[c]) cameras[c].set(set->index, std::move(*set->images[c]), set->late_of(c));
     if (!cameras.empty()) progress.advance((set->index + 1.0) / cameras[0].count());
   }
+  for (std::size_t c = 0; c < cameras.size(); ++c) cameras[c].end_at(source.sequences()[c].count);
   return cameras;
 }
 

@@ -40,7 +40,7 @@ struct Sequence {
 /// \return  empty if all are alike
 std::vector<double> relative_exposures(std::span<const double> pattern, int count);
 
-/// The frames of one camera. frame(i) was exposed at time i [frames]; a dropped frame is absent.
+/// The frames of one camera. frame(i) was exposed at time i + late(i) [frames]; a dropped frame is absent.
 class Frames {
  public:
   Frames() = default;
@@ -54,10 +54,16 @@ class Frames {
   bool has(int i) const { return images_[static_cast<std::size_t>(i)].has_value(); }
   int dropped() const;
   /// \throws std::invalid_argument  if i is out of range, or size or depth are not the sequence's
-  void set(int i, GrayImage image);
+  void set(int i, GrayImage image, float late = 0);
   /// Gives a frame's memory back: it counts as dropped from now on.
   void forget(int i) { images_[static_cast<std::size_t>(i)].reset(); }
   const GrayImage& frame(int i) const { return *images_[static_cast<std::size_t>(i)]; }
+  /// [frames] by which frame i was exposed later than at time i; of frames that were forgotten, too.
+  float late(int i) const { return late_.empty() ? 0 : late_[static_cast<std::size_t>(i)]; }
+  /// Whether all frames that have come so far were exposed exactly when they should.
+  bool is_even() const { return late_.empty(); }
+  /// No frame from `count` on will come: live cameras are not known to stop before they do.
+  void end_at(int count);
 
   /// The gray value sequences of a row of pixels, black level removed and divided by the frame's relative exposure:
   /// samples(x, i) is what pixel (x, y) would show at frame i with the longest exposure and no limit, NaN where the
@@ -74,6 +80,7 @@ class Frames {
  private:
   Sequence sequence_;
   std::vector<std::optional<GrayImage>> images_;
+  std::vector<float> late_;  ///< one a frame; empty: all are 0
 };
 
 /// The brightest sample of each pixel over all frames as read_row() has them, clipped ones at saturation: the picture
@@ -87,6 +94,9 @@ Image<std::uint8_t> count_clipped(const Frames& frames);
 struct FrameSet {
   int index = 0;  ///< [frames] time of exposure
   std::vector<std::optional<GrayImage>> images;
+  std::vector<float> late = {};  ///< [frames] by which each camera's exposure was later than that; empty: not at all
+
+  float late_of(std::size_t camera) const { return late.empty() ? 0 : late[camera]; }
 };
 
 /// Yields the simultaneous frames of all cameras, one instant after the other. A folder, a recording, the
@@ -94,6 +104,8 @@ struct FrameSet {
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
+  /// How many instants there are may be known only after the last one: until then, live cameras tell the most that
+  /// there can be.
   virtual const std::vector<Sequence>& sequences() const = 0;
   /// The next instant, or nothing after the last one.
   /// \throws Error  if a frame cannot be read

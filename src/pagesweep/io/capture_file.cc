@@ -107,6 +107,24 @@ void read_places(const JsonReader& json, SequenceFiles& files) {
   files.first = first ? first->integer(0, highest_number) : 0;
 }
 
+/// One a frame, null where it was dropped, ascending.
+std::vector<std::int64_t> read_timestamps(const JsonReader& json, int count) {
+  std::vector<std::int64_t> timestamps;
+  std::int64_t last = no_timestamp;
+  for (const JsonReader& item : json.items()) {
+    timestamps.push_back(item.is_null() ? no_timestamp : item.big_integer());
+    if (timestamps.back() == no_timestamp) continue;
+    if (timestamps.back() <= last)
+      throw item.error(fmt::format("expected a time after {}, found {}", last, timestamps.back()));
+    last = timestamps.back();
+  }
+  if (timestamps.size() != static_cast<std::size_t>(count))
+    throw json.error(
+        fmt::format("expected one time a frame ({}), null for a dropped one, found {}", count, timestamps.size()));
+  if (last == no_timestamp) throw json.error("expected a time of at least one frame");
+  return timestamps;
+}
+
 SequenceFiles read_sequence(const JsonReader& json) {
   SequenceFiles files;
   files.camera = json.at("camera").text();
@@ -120,6 +138,8 @@ SequenceFiles read_sequence(const JsonReader& json) {
     throw json.at("saturation")
         .error(fmt::format("expected more than black_level ({}), found {}", files.black_level, files.saturation));
   if (const auto exposure = json.find("exposure_ms")) files.exposure_ms = read_exposures(*exposure, files.count);
+  if (const auto timestamps = json.find("timestamps_ns"))
+    files.timestamps_ns = read_timestamps(*timestamps, files.count);
   return files;
 }
 
@@ -166,6 +186,8 @@ Capture read_capture(const std::filesystem::path& folder_or_file) {
   capture.sequences = read_sequences(json.at("sequences"));
   if (const auto scan = json.find("scan")) capture.scan = read_path(scan->at("image"));
   if (const auto notes = json.find("notes")) capture.notes = notes->text();
+  if (const auto interval = json.find("frame_interval_ns")) capture.frame_interval_ns = interval->number(1, 1e12);
+  if (const auto triggered = json.find("triggered")) capture.is_triggered = triggered->boolean();
   return capture;
 }
 
@@ -187,6 +209,8 @@ nlohmann::ordered_json to_json(const SequenceFiles& files) {
   json["saturation"] = files.saturation;
   if (files.exposure_ms.size() == 1) json["exposure_ms"] = files.exposure_ms.front();
   if (files.exposure_ms.size() > 1) json["exposure_ms"] = files.exposure_ms;
+  for (const std::int64_t time : files.timestamps_ns)
+    json["timestamps_ns"].push_back(time == no_timestamp ? nlohmann::ordered_json() : nlohmann::ordered_json(time));
   return json;
 }
 
@@ -198,6 +222,8 @@ void write_capture(const Capture& capture) {
   json["sequences"] = nlohmann::ordered_json::array();
   for (const SequenceFiles& files : capture.sequences) json["sequences"].push_back(to_json(files));
   if (capture.scan) json["scan"] = {{"image", capture.scan->generic_string()}};
+  if (capture.frame_interval_ns > 0) json["frame_interval_ns"] = capture.frame_interval_ns;
+  if (!capture.is_triggered) json["triggered"] = false;
   if (!capture.notes.empty()) json["notes"] = capture.notes;
   write_json(capture.folder / "capture.json", json);
 }

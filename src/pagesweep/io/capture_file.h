@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,7 +28,12 @@ struct SequenceFiles {
   std::vector<double> exposure_ms = {};
   std::filesystem::path recording = {};  ///< see RecordingReader; empty: the frames are files
   std::vector<int> dropped = {};         ///< frames without a page in the recording, in ascending order
+  /// When each frame was exposed, by the camera's own clock; `no_timestamp` for frames that are not there. Empty:
+  /// evenly.
+  std::vector<std::int64_t> timestamps_ns = {};
 };
+
+inline constexpr std::int64_t no_timestamp = std::numeric_limits<std::int64_t>::min();
 
 /// A recorded sweep (docs/formats.md, "Capture"). Its paths are as given: absolute, or relative to `folder`.
 struct Capture {
@@ -35,6 +42,9 @@ struct Capture {
   std::vector<SequenceFiles> sequences;
   std::optional<std::filesystem::path> scan;  ///< the scanner's own picture
   std::string notes;
+  double frame_interval_ns = 0;  ///< between frames that were triggered evenly; 0: as the timestamps usually have it
+  bool is_triggered = true;      ///< frame i of all cameras was exposed at once, whatever their clocks say; else these
+                                 ///< are one clock
 
   std::filesystem::path rig_path() const { return folder / rig; }
   std::optional<std::filesystem::path> scan_path() const;

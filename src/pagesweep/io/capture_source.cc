@@ -12,6 +12,7 @@
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/io/capture_file.h"
+#include "pagesweep/io/frame_instants_internal.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/recording_file.h"
 
@@ -127,14 +128,14 @@ std::unique_ptr<const CameraFrames> open_frames(const Capture& capture, const Se
 class CaptureSource : public FrameSource {
  public:
   CaptureSource(const Capture& capture, const Rig& rig) {
+    instants_ = instants_of(capture);
     for (const SequenceFiles& files : capture.sequences) {
       const Camera* camera = rig.find_camera(files.camera);
       if (!camera)
         throw bad_input(capture.folder / "capture.json", "sequences",
                         fmt::format("camera \"{}\" is not in the rig {}", files.camera, capture.rig_path().string()));
-      sequences_.push_back(make_sequence(files, *camera));
+      sequences_.push_back(on_instants(make_sequence(files, *camera), instants_));
       cameras_.push_back(open_frames(capture, files, {camera->width, camera->height}));
-      count_ = std::max(count_, files.count);
     }
     reader_ = std::jthread([this](const std::stop_token& stop) { read_ahead(stop); });
   }
@@ -153,16 +154,18 @@ class CaptureSource : public FrameSource {
   }
 
  private:
+  int count() const { return static_cast<int>(instants_.size()); }
+
   /// Runs in the reader's thread until all frames are read, one cannot be, or the source goes.
   void read_ahead(const std::stop_token& stop) {
     std::exception_ptr failure;
     try {
-      for (int begin = 0; begin < count_ && !failure; begin += instants_together) {
+      for (int begin = 0; begin < count() && !failure; begin += instants_together) {
         std::unique_lock lock(mutex_);
         if (!changed_.wait(lock, stop, [&] { return ahead_.size() <= instants_together; })) return;
         lock.unlock();
         std::vector<FrameSet> sets;
-        failure = read_instants(begin, std::min(count_, begin + instants_together), stop, sets);
+        failure = read_instants(begin, std::min(count(), begin + instants_together), stop, sets);
         lock.lock();
         std::ranges::move(sets, std::back_inserter(ahead_));
         changed_.notify_all();
@@ -180,15 +183,18 @@ class CaptureSource : public FrameSource {
   /// \param sets  all instants before the error
   std::exception_ptr read_instants(int begin, int end, const std::stop_token& stop, std::vector<FrameSet>& sets) const {
     const int cameras = static_cast<int>(cameras_.size());
-    for (int i = begin; i < end; ++i) sets.push_back({i, std::vector<std::optional<GrayImage>>(cameras_.size())});
+    for (int i = begin; i < end; ++i) {
+      const Instant& instant = instants_[static_cast<std::size_t>(i)];
+      sets.push_back({instant.index, std::vector<std::optional<GrayImage>>(cameras_.size()), instant.late});
+    }
     std::vector<std::exception_ptr> errors(sets.size() * cameras_.size());
     parallel_ranges(static_cast<int>(errors.size()), 1, [&](int k, int) {
       if (stop.stop_requested()) return;
       try {
         const auto camera = static_cast<std::size_t>(k % cameras);
         const int i = begin + k / cameras;
-        if (i < sequences_[camera].count)
-          sets[static_cast<std::size_t>(k / cameras)].images[camera] = cameras_[camera]->read(i);
+        const int number = instants_[static_cast<std::size_t>(i)].number;
+        if (number >= 0) sets[static_cast<std::size_t>(k / cameras)].images[camera] = cameras_[camera]->read(number);
       } catch (...) {
         errors[static_cast<std::size_t>(k)] = std::current_exception();
       }
@@ -201,7 +207,7 @@ class CaptureSource : public FrameSource {
 
   std::vector<Sequence> sequences_;
   std::vector<std::unique_ptr<const CameraFrames>> cameras_;
-  int count_ = 0;
+  std::vector<Instant> instants_;
 
   std::mutex mutex_;  ///< guards what follows
   std::condition_variable_any changed_;

@@ -3,13 +3,17 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <memory>
+#include <random>
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/io/atomic_file.h"
 #include "pagesweep/io/file_descriptor_internal.h"
+#include "pagesweep/io/frame_instants_internal.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/io/recording_file.h"
 
@@ -39,21 +43,28 @@ class RecordingOfSequence : public SequenceWriter {
 
   void append(const std::vector<FrameSet>& sets, std::size_t camera) override {
     for (const FrameSet& set : sets) {
-      if (const auto& image = set.images[camera])
-        writer_.append(*image);
-      else
-        dropped_.push_back(set.index);
+      if (!set.images[camera]) continue;
+      leave_out(set.index);
+      writer_.append(*set.images[camera]);
+      ++next_;
     }
   }
   void finish(SequenceFiles& files) override {
+    leave_out(files.count);
     writer_.commit();
     files.recording = name_;
     files.dropped = dropped_;
   }
 
  private:
+  /// All frames before this one that have not come.
+  void leave_out(int end) {
+    for (; next_ < end; ++next_) dropped_.push_back(next_);
+  }
+
   std::string name_;
   RecordingWriter writer_;
+  int next_ = 0;
   std::vector<int> dropped_;
 };
 
@@ -84,7 +95,51 @@ class FilesOfSequence : public SequenceWriter {
   SequenceFiles files_;
 };
 
-void copy_frames(FrameSource& source, const ConvertOptions& options, Capture& copy, Progress& progress) {
+/// Leaves out frames, and gives those that are left the numbers that they will have in the copy.
+class Selection {
+ public:
+  Selection(const Capture& capture, const ConvertOptions& options)
+      : instants_(instants_of(capture)), options_(options), random_(static_cast<std::uint64_t>(options.seed)) {}
+
+  /// \return whether something of the set is left
+  bool select(FrameSet& set) {
+    int& number = set.index;
+    number = instants_[static_cast<std::size_t>(number)].number;
+    const bool is_lost = chance(options_.lose);
+    for (auto& image : set.images)
+      if (chance(options_.drop)) image.reset();
+    if (number < 0 || is_lost) return false;
+    kept_.push_back(number);
+    if (options_.lose > 0) number = static_cast<int>(kept_.size()) - 1;
+    return true;
+  }
+
+  /// What becomes of a sequence when triggers are lost: those that are left, and their times.
+  void renumber(SequenceFiles& files, double interval_ns) const {
+    if (!(options_.lose > 0)) return;
+    const SequenceFiles all = files;
+    files.timestamps_ns.clear();
+    if (all.exposure_ms.size() > 1) files.exposure_ms.clear();
+    for (const int number : kept_) {
+      const auto i = static_cast<std::size_t>(number);
+      files.timestamps_ns.push_back(all.timestamps_ns.empty() ? std::llround(number * interval_ns)
+                                                              : all.timestamps_ns[i]);
+      if (all.exposure_ms.size() > 1) files.exposure_ms.push_back(all.exposure_ms[i % all.exposure_ms.size()]);
+    }
+    files.count = static_cast<int>(kept_.size());
+  }
+
+ private:
+  bool chance(double share) { return static_cast<double>(random_() >> 11) * 0x1p-53 < share; }
+
+  std::vector<Instant> instants_;
+  const ConvertOptions& options_;
+  std::mt19937_64 random_;
+  std::vector<int> kept_;
+};
+
+void copy_frames(FrameSource& source, Selection& selection, const ConvertOptions& options, Capture& copy,
+                 Progress& progress) {
   std::vector<std::unique_ptr<SequenceWriter>> writers;
   for (const Sequence& sequence : source.sequences()) {
     if (options.format == FrameFormat::recording)
@@ -95,17 +150,22 @@ void copy_frames(FrameSource& source, const ConvertOptions& options, Capture& co
   progress.begin("copying the frames");
   const double count = source.sequences().empty() ? 1 : source.sequences().front().count;
   std::vector<FrameSet> sets;
-  while (auto set = source.next()) {
-    sets.push_back(std::move(*set));
-    const int done = sets.back().index + 1;
-    if (sets.size() < instants_together && done < count) continue;
+  const auto store = [&] {
     parallel_rows(static_cast<int>(writers.size()),
                   [&](int c) { writers[static_cast<std::size_t>(c)]->append(sets, static_cast<std::size_t>(c)); });
     sets.clear();
+  };
+  while (auto set = source.next()) {
+    const int done = set->index + 1;
+    if (selection.select(*set)) sets.push_back(std::move(*set));
+    if (sets.size() < instants_together) continue;
+    store();
     progress.advance(done / count);
   }
+  store();
   for (std::size_t c = 0; c < writers.size(); ++c) {
     SequenceFiles& files = copy.sequences[c];
+    selection.renumber(files, copy.frame_interval_ns);
     files.frames.clear(), files.first = 0, files.recording.clear(), files.dropped.clear();
     writers[c]->finish(files);
   }
@@ -140,7 +200,11 @@ Capture convert_capture(const Capture& capture, FrameSource& frames, const fs::p
   require_empty(folder);
   Capture copy = capture;
   copy.folder = folder;
-  copy_frames(frames, options, copy, progress);
+  constexpr double usual_interval_ns = 10e6;
+  if (options.lose > 0 && copy.frame_interval_ns == 0 && copy.sequences[0].timestamps_ns.empty())
+    copy.frame_interval_ns = usual_interval_ns;
+  Selection selection(capture, options);
+  copy_frames(frames, selection, options, copy, progress);
   progress.begin("copying the rest");
   copy.rig = "rig.json";
   copy_whole(capture.rig_path(), copy.rig_path());

@@ -21,15 +21,21 @@ constexpr auto names_of(FrameFormat) { return std::array<std::string_view, 3>{"r
 
 struct ConvertOptions {
   FrameFormat format = FrameFormat::recording;
+  double drop = 0;
+  double lose = 0;
+  int seed = 1;
   template <class Visitor>
   void describe(Visitor&& visit) {
     visit("format", format, "", "one file a camera that needs no decoding, or one file a frame");
+    visit("drop", drop, "", "share of each camera's frames to leave out, at random: what a poor cable would do");
+    visit("lose", lose, "", "share of the triggers to leave out for all cameras: their times alone will tell");
+    visit("seed", seed, "", "of what is left out");
   }
 };
 
 /// Copies a capture into a folder of its own, with its frames in another format: gray values, dropped frames, exposures
 /// and notes stay what they are. Rig, scan and the reference data in truth/ are copied byte by byte. capture.json is
-/// written last.
+/// written last. Unless frames are to be left out, nothing is lost.
 /// \param frames  open_capture() of it; it is read to its end
 /// \param folder  is made if it is missing
 /// \return  the copy

@@ -6,6 +6,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "pagesweep/io/atomic_file.h"
@@ -126,6 +128,7 @@ std::vector<std::string> JsonReader::names() const {
 
 bool JsonReader::is_object() const { return value_at(value_).is_object(); }
 
+bool JsonReader::is_null() const { return value_at(value_).is_null(); }
 bool JsonReader::is_array() const { return value_at(value_).is_array(); }
 
 std::string JsonReader::text() const {
@@ -158,6 +161,14 @@ int JsonReader::integer(int lowest, int highest) const {
   const double value = number();
   if (value == std::floor(value) && value >= lowest && value <= highest) return static_cast<int>(value);
   throw error(fmt::format("expected a whole number from {} to {}, found {}", lowest, highest, value));
+}
+
+std::int64_t JsonReader::big_integer() const {
+  const json& value = value_at(value_);
+  if (value.is_number_unsigned() && value.get<std::uint64_t>() > std::numeric_limits<std::int64_t>::max())
+    throw error("expected a whole number of 64 bit");
+  if (!value.is_number_integer()) throw unexpected("a whole number");
+  return value.get<std::int64_t>();
 }
 
 std::vector<double> JsonReader::numbers() const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -35,10 +36,12 @@ class JsonReader {
   std::vector<JsonReader> items() const;                        ///< of an array
   std::vector<std::string> names() const;                       ///< of an object's fields, in alphabetical order
   bool is_object() const;
+  bool is_null() const;
   bool is_array() const;  ///< where a field may be one or several
   std::string text() const;
   bool boolean() const;
   int integer(int lowest, int highest) const;
+  std::int64_t big_integer() const;                    ///< of 64 bit
   double number() const;                               ///< finite
   double number(double lowest, double highest) const;  ///< within these, both included
   std::vector<double> numbers() const;                 ///< an array of finite numbers

@@ -194,7 +194,7 @@ void follow_frames(FrameSource& source, const ScanOptions& options, Measurement&
     on_news(times);
     progress.advance(part);
   }
-  measurement.timing = times.finish(progress);
+  measurement.timing = times.finish(progress, source.sequences()[0].count);
   for (std::size_t c = 0; c < source.sequences().size(); ++c) {
     measurement.dropped_frames.push_back(times.dropped_frames(c));
     measurement.clipped_frames.push_back(times.clipped_frames(c));

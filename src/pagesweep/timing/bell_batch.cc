@@ -117,6 +117,23 @@ struct Equations {
   Each pp, p1, n1, ps, s1, ss, rp, r1, rs, rr;
 };
 
+/// The profile and its slope at samples x frames later than those of the table: Taylor's second order, the bend being
+/// the slope's change from sample to sample.
+struct Shifted {
+  Vector profile, slope;
+};
+Shifted shift(const BellTable& table, std::size_t at, Vector slope, Vector x) {
+  const Floats d;
+  const std::size_t end = table.slope.size() - hn::Lanes(d);
+  const Vector before = hn::LoadU(d, &table.slope[at > 0 ? at - 1 : 0]);
+  const Vector after = hn::LoadU(d, &table.slope[std::min(at + 1, end)]);
+  const Vector bend = hn::Mul(hn::Set(d, 0.5F), hn::Sub(after, before));
+  const Vector half_way = hn::MulAdd(hn::Mul(hn::Set(d, 0.5F), x), bend, slope);
+  return {hn::MulAdd(x, half_way, hn::LoadU(d, &table.value[at])), hn::MulAdd(x, bend, slope)};
+}
+
+/// \tparam is_even  no sample was exposed later than its frame
+template <bool is_even>
 void weigh(const BellBatch& batch, Equations& equations) {
   const Floats d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
@@ -137,8 +154,15 @@ void weigh(const BellBatch& batch, Equations& equations) {
     for (Vector& sum : part) sum = hn::Zero(d);
     for (int k = 0; k < table.length; k += lanes) {
       const std::size_t at = place.row + static_cast<std::size_t>(k);
-      const Vector gray = hn::LoadU(d, gray_row + k), slope = hn::LoadU(d, &table.slope[at]);
-      const Vector profile = hn::NegMulAdd(hn::MulAdd(wider, after, late), slope, hn::LoadU(d, &table.value[at]));
+      const Vector gray = hn::LoadU(d, gray_row + k);
+      Vector slope = hn::LoadU(d, &table.slope[at]), profile;
+      if constexpr (is_even) {
+        profile = hn::NegMulAdd(hn::MulAdd(wider, after, late), slope, hn::LoadU(d, &table.value[at]));
+      } else {
+        const Vector sample_late = hn::LoadU(d, batch.late[bell] + place.first + k);
+        const Shifted shifted = shift(table, at, slope, hn::Sub(sample_late, hn::MulAdd(wider, after, late)));
+        profile = shifted.profile, slope = shifted.slope;
+      }
       const Vector model = hn::MulAdd(amplitude, profile, background);
       const Vector variance = hn::MulAdd(gain, hn::Max(model, hn::Zero(d)), read);
       const Vector use = hn::Mul(hn::LoadU(d, present + k), hn::LoadU(d, &table.inside[static_cast<std::size_t>(k)]));
@@ -172,7 +196,7 @@ void Refine(BellBatch& batch) {
   BellBatch::Each<bool> arrived{};
   bool is_done = false;
   for (int step = 0; step < most_steps && !is_done; ++step) {
-    weigh(batch, e);
+    batch.late[0] ? weigh<false>(batch, e) : weigh<true>(batch, e);
     is_done = true;
     for (std::size_t i = 0; i < static_cast<std::size_t>(batch.count); ++i) {
       // The inverse of a symmetric matrix by its cofactors, over the determinant.

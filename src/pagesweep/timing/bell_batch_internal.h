@@ -26,6 +26,7 @@ struct BellBatch {
   Each<float> width_rest{};      ///< log width beyond the table's
   Each<const float*> gray{};     ///< samples; finite
   Each<const float*> present{};  ///< for each of them 1, or 0 if it is to be passed over
+  Each<const float*> late{};     ///< for each of them [frames] by which it was exposed later; all null: not at all
 
   alignas(64) Each<float> time{}, amplitude{}, background{}, sigma{}, chi_square{};
   Each<bool> good{};

@@ -67,7 +67,8 @@ class Fitter {
     for (std::size_t k = 0; k < gray_.size(); ++k) {
       const double gray = gray_[k];
       if (std::isnan(gray)) continue;
-      const double after = first_frame_ + static_cast<double>(k) - bell.time;
+      const double late = options_.late.empty() ? 0 : static_cast<double>(options_.late[k]);
+      const double after = first_frame_ + static_cast<double>(k) + late - bell.time;
       const double t = after * per_width;
       const auto [value, slope] = profile_.at(t);
       double model = bell.amplitude * value + bell.background;

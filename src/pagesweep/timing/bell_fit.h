@@ -40,8 +40,9 @@ enum class BellUnknowns {
 
 struct BellFitOptions {
   BellUnknowns unknowns = BellUnknowns::basic;
-  double log_width_sigma = 0.2;  ///< standard deviation of log width around the start value
-  int most_iterations = 12;      ///< after 1, the covariance is that of the start values
+  double log_width_sigma = 0.2;      ///< standard deviation of log width around the start value
+  int most_iterations = 12;          ///< after 1, the covariance is that of the start values
+  std::span<const float> late = {};  ///< [frames] by which each sample was exposed later than its frame; empty: 0
 };
 
 struct BellFit {

@@ -19,12 +19,17 @@ namespace {
 struct Pupil {
   std::size_t camera = 0;
   std::vector<float> gray;
-  int first_frame = 0;   ///< of gray, after it was cut to the stripe's surroundings
-  bool clipped = false;  ///< at least one sample of the shortest exposure is
-  double middle = 0;     ///< [frames] between the crossings of half height
-  double fwhm = 0;       ///< [frames]
+  int first_frame = 0;      ///< of gray, after it was cut to the stripe's surroundings
+  std::vector<float> late;  ///< [frames] by which each sample was exposed later; empty: not at all
+  bool clipped = false;     ///< at least one sample of the shortest exposure is
+  double middle = 0;        ///< [frames] between the crossings of half height
+  double fwhm = 0;          ///< [frames]
   Bell bell;
   std::uint64_t rank = 0;  ///< random, fixed by the pixel's place
+
+  double time_of(std::size_t k) const {
+    return first_frame + static_cast<double>(k) + (late.empty() ? 0 : static_cast<double>(late[k]));
+  }
 };
 
 constexpr int first_lesson = 32;                             // [frames]
@@ -114,7 +119,10 @@ std::vector<Pupil> find_pupils(const Frames& frames, int end, const FrameNoise& 
     for (int x = 0; x < frames.width(); x += column_step) {
       Pupil pupil;
       pupil.camera = camera;
-      for (int i = 0; i < end; ++i) pupil.gray.push_back(samples(x, i));
+      for (int i = 0; i < end; ++i) {
+        pupil.gray.push_back(samples(x, i));
+        if (!frames.is_even()) pupil.late.push_back(frames.late(i));
+      }
       const std::vector<float> outline = outline_of(pupil.gray, noise);
       pupil.rank = mix((static_cast<std::uint64_t>(r * row_step) << 32) + static_cast<std::uint64_t>(x) +
                        0x9E3779B97F4A7C15ULL * (camera + 1));
@@ -178,6 +186,7 @@ void cut(Pupil& pupil, double reach) {
   const int begin = std::clamp(static_cast<int>(std::floor(pupil.middle - reach)), 0, count);
   const int end = std::clamp(static_cast<int>(std::ceil(pupil.middle + reach)) + 1, begin, count);
   pupil.gray = {pupil.gray.begin() + begin, pupil.gray.begin() + end};
+  if (!pupil.late.empty()) pupil.late = {pupil.late.begin() + begin, pupil.late.begin() + end};
   pupil.first_frame = begin;
 }
 
@@ -228,13 +237,15 @@ class Teacher {
     fits_.resize(pupils_.size());
     // With the first profile, which is wrong, no widths can be told.
     const bool fit_width = iteration > 0 && !only_flanks_;
-    const BellFitOptions options{.unknowns = fit_width ? BellUnknowns::width : BellUnknowns::basic,
-                                 .log_width_sigma = 0.1,
-                                 .most_iterations = 20};
+    const BellFitOptions common{.unknowns = fit_width ? BellUnknowns::width : BellUnknowns::basic,
+                                .log_width_sigma = 0.1,
+                                .most_iterations = 20};
     parallel_ranges(static_cast<int>(pupils_.size()), 64, [&](int begin, int end) {
       for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
         Bell start = iteration == 0 ? pupils_[i].bell : fits_[i].bell;
         start.width = 1;
+        BellFitOptions options = common;
+        options.late = pupils_[i].late;
         fits_[i] = fit_bell(pupils_[i].gray, pupils_[i].first_frame, learned_.profile, noise_[pupils_[i].camera], start,
                             options);
       }
@@ -297,7 +308,7 @@ class Teacher {
                std::vector<std::vector<StripeProfile::Point>>& bins) const {
     for (std::size_t k = 0; k < pupil.gray.size(); ++k) {
       const SensorNoise& noise = noise_[pupil.camera].at(pupil.first_frame + static_cast<int>(k));
-      const double gray = pupil.gray[k], frame = pupil.first_frame + static_cast<double>(k);
+      const double gray = pupil.gray[k], frame = pupil.time_of(k);
       const double model = bell.gray_at(frame, learned_.profile);
       // Close below the ceiling those samples are clipped whose noise is positive. To leave out whole moments, as the
       // model has them, and not single samples, as they came out, keeps the profile's tip from a bias.
@@ -362,7 +373,7 @@ class Teacher {
       const int frame = pupil.first_frame + static_cast<int>(k);
       const SensorNoise& noise = noise_[pupil.camera].at(frame);
       const double exposure = noise_[pupil.camera].exposure(frame);
-      const double time = pupil.first_frame + static_cast<double>(k);
+      const double time = pupil.time_of(k);
       const Eigen::Vector4d gradient = bell_gradient(fit.bell, learned_.profile, time);
       const double model = fit.bell.amplitude * gradient(0) + fit.bell.background;
       if (model > noise.ceiling - 3 * std::sqrt(noise.variance(model))) continue;

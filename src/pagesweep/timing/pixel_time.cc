@@ -23,15 +23,17 @@ std::array<Flank, 2> examine_flanks(const PixelWindow& window, const Bell& bell,
   const int begin = static_cast<int>(std::ceil(bell.time + bell.width * judge.profile.begin()));
   const int end = static_cast<int>(std::floor(bell.time + bell.width * judge.profile.end()));
   for (int i = begin; i <= end; ++i) {
-    const double slope = judge.profile.derivative((i - bell.time) / bell.width);
+    const int at = i - window.first_frame;
+    const bool is_seen = at >= 0 && at < static_cast<int>(window.gray.size());
+    const double late = is_seen ? window.late_of(static_cast<std::size_t>(at)) : 0;
+    const double slope = judge.profile.derivative((i + late - bell.time) / bell.width);
     Flank& flank = flanks[slope > 0 ? 0 : 1];
     const double information = slope * slope;
     flank.whole += information;
     if (i < 0 || i >= judge.frame_count) continue;
     flank.recorded += information;
-    const int k = i - window.first_frame;
-    if (k < 0 || k >= static_cast<int>(window.gray.size())) continue;
-    const float gray = window.gray[static_cast<std::size_t>(k)];
+    if (!is_seen) continue;
+    const float gray = window.gray[static_cast<std::size_t>(at)];
     if (std::isfinite(gray)) flank.usable += information;
     if (std::isinf(gray)) flank.clipped += information;
   }
@@ -45,7 +47,7 @@ bool misfits(const PixelWindow& window, const Bell& bell, const PixelJudge& judg
   double squares = 0, weights = 0;
   int samples = 0;
   for (std::size_t k = 0; k < window.gray.size(); ++k) {
-    const double frame = window.first_frame + static_cast<double>(k);
+    const double frame = window.time_of(k);
     if (std::abs(frame - bell.time) > reach * bell.width || !std::isfinite(window.gray[k])) continue;
     const double residual = window.gray[k] - bell.gray_at(frame, judge.profile);
     const double weight = judge.noise.weight(window.first_frame + static_cast<int>(k));
@@ -82,9 +84,10 @@ BellFit fit_core(const PixelWindow& window, const BellFit& first, const PixelJud
   const int size = static_cast<int>(window.gray.size());
   const int begin = std::clamp(static_cast<int>(std::ceil(start.time - reach)) - window.first_frame, 0, size);
   const int end = std::clamp(static_cast<int>(std::floor(start.time + reach)) + 1 - window.first_frame, begin, size);
-  return fit_bell(window.gray.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin)),
-                  window.first_frame + begin, judge.profile, judge.noise, start,
-                  {.unknowns = BellUnknowns::curved_background});
+  const auto offset = static_cast<std::size_t>(begin), count = static_cast<std::size_t>(end - begin);
+  return fit_bell(window.gray.subspan(offset, count), window.first_frame + begin, judge.profile, judge.noise, start,
+                  {.unknowns = BellUnknowns::curved_background,
+                   .late = window.late.empty() ? window.late : window.late.subspan(offset, count)});
 }
 
 /// Whether a robust estimate shows the efficient one to be wrong.
@@ -150,7 +153,7 @@ PixelTime time_by_center_of_mass(const PixelWindow& window, const PixelJudge& ju
   Bell bell = window.start;
   // Background: mean of what lies outside the profile's support.
   double outside = 0, background = 0, highest = 0;
-  const auto time_of = [&](std::size_t k) { return window.first_frame + static_cast<double>(k); };
+  const auto time_of = [&](std::size_t k) { return window.time_of(k); };
   const auto noise_of = [&](std::size_t k) { return judge.noise.at(window.first_frame + static_cast<int>(k)); };
   const auto gray_of = [&](std::size_t k) { return std::min(window.gray[k], static_cast<float>(noise_of(k).ceiling)); };
   for (std::size_t k = 0; k < window.gray.size(); ++k) {
@@ -203,16 +206,24 @@ PixelTime time_by_shift(const PixelWindow& window, const PixelJudge& judge) {
                           : PixelStatus::truncated;
     return unsolved;
   }
-  const Bell bell{shift->a, shift->b, shift->c + window.first_frame + before, width};
+  // Eq. 3 knows whole frames only: between two that were late, the bell is.
+  const double frame = shift->c + before;
+  const auto last = static_cast<double>(std::max<std::size_t>(window.gray.size(), 2) - 2);
+  const auto below = static_cast<std::size_t>(std::clamp(std::floor(frame), 0.0, last));
+  const double late = window.late.empty() ? 0
+                                          : std::lerp(window.late_of(below), window.late_of(below + 1),
+                                                      frame - static_cast<double>(below));
+  const Bell bell{shift->a, shift->b, frame + window.first_frame + late, width};
   const double noise = std::sqrt(judge.noise.sensor().variance(bell.background + 0.5 * bell.amplitude));
   // What the noise alone would leave. Eq. 9's own residuals know less: the noise in its matrix passes for slope.
-  const BellFit at_bell =
-      fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, bell, {.most_iterations = 1});
+  const BellFit at_bell = fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, bell,
+                                   {.most_iterations = 1, .late = window.late});
   return describe(window, bell, at_bell.time_sigma(), shift->residual_rms / noise, judge);
 }
 
 PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge) {
-  BellFit fit = fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, window.start);
+  BellFit fit =
+      fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, window.start, {.late = window.late});
   const double misfit = std::sqrt(fit.reduced_chi_square());
   double doubt = 0;  // [frames] about a correction
   if (judge.refuse_misfits && fit.reduced_chi_square() > noise_limit(fit.samples)) {

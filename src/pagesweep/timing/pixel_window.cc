@@ -36,10 +36,10 @@ double reach_around(const StripeProfile& profile) {
 }
 
 PixelWindow make_window(std::span<const float> gray, int first_frame, double centre, double width,
-                        const StripeProfile& profile, const FrameNoise& noise) {
+                        const StripeProfile& profile, const FrameNoise& noise, std::span<const float> late) {
   float lowest = std::numeric_limits<float>::infinity();
   for (const float sample : gray) lowest = sample < lowest ? sample : lowest;
-  PixelWindow window{gray, first_frame, {}};
+  PixelWindow window{gray, first_frame, {}, late};
   window.start.background = std::isfinite(lowest) ? lowest : 0;
   window.start.time = centre;
   window.start.width = width;

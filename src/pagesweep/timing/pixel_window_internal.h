@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 #include "pagesweep/timing/bell_fit.h"
@@ -11,9 +12,13 @@ namespace pagesweep {
 
 /// The part of one pixel's gray value sequence that surrounds the stripe, and what a first look at it tells.
 struct PixelWindow {
-  std::span<const float> gray;  ///< consecutive samples; NaN: dropped, +infinity: clipped
-  int first_frame = 0;          ///< time of gray[0]
-  Bell start;                   ///< rough, good enough to start any estimator from
+  std::span<const float> gray;       ///< consecutive samples; NaN: dropped, +infinity: clipped
+  int first_frame = 0;               ///< time of gray[0]
+  Bell start;                        ///< rough, good enough to start any estimator from
+  std::span<const float> late = {};  ///< [frames] by which each sample was exposed later; empty: not at all
+
+  double late_of(std::size_t k) const { return late.empty() ? 0 : static_cast<double>(late[k]); }
+  double time_of(std::size_t k) const { return first_frame + static_cast<double>(k) + late_of(k); }
 };
 
 /// [frames] to both sides of the stripe's middle, at width 1, that a window has.
@@ -22,7 +27,8 @@ double reach_around(const StripeProfile& profile);
 /// Takes a first look at samples.
 /// \param centre  [frames] where the bell is expected
 /// \param width   of the stripe there, relative to the profile's
+/// \param late    see PixelWindow
 PixelWindow make_window(std::span<const float> gray, int first_frame, double centre, double width,
-                        const StripeProfile& profile, const FrameNoise& noise);
+                        const StripeProfile& profile, const FrameNoise& noise, std::span<const float> late = {});
 
 }  // namespace pagesweep

@@ -8,7 +8,9 @@
 namespace pagesweep {
 
 PlainBells::PlainBells(const BellTables& tables, const SensorNoise& noise, double fwhm)
-    : tables_(tables), margin_(static_cast<int>(std::ceil(0.25 * fwhm)) + 1) {  // the search finds it nearer than that
+    : tables_(tables),
+      margin_(static_cast<int>(std::ceil(0.25 * fwhm)) + 1),  // the search finds it nearer than that
+      most_late_(0.07 * fwhm) {                               // Taylor's third order: 1e-3 of the height
   batch_.middle = tables.longest_reach() + margin_;
   batch_.most_moved = static_cast<float>(margin_);
   batch_.near = static_cast<float>(0.05 * fwhm);
@@ -18,13 +20,14 @@ PlainBells::PlainBells(const BellTables& tables, const SensorNoise& noise, doubl
   batch_.gain = static_cast<float>(noise.gain);
 }
 
-void PlainBells::add(int centre, double log_width, const float* gray, const float* present) {
+void PlainBells::add(int centre, double log_width, const float* gray, const float* present, const float* late) {
   const auto i = static_cast<std::size_t>(batch_.count++);
   centre_[i] = centre;
   batch_.table[i] = &tables_.at(log_width);
   batch_.width_rest[i] = static_cast<float>(log_width) - batch_.table[i]->log_width;
   batch_.gray[i] = gray;
   batch_.present[i] = present;
+  batch_.late[i] = late;
   batch_.time[i] = 0;
   batch_.good[i] = true;
   batch_.left_to[i] = 0;

@@ -37,10 +37,13 @@ class PlainBells {
   int reach(double log_width) const { return tables_.at(log_width).reach + margin_; }
 
   void clear() { batch_.count = 0; }
-  /// Another pixel. Both arrays must last until fit() and reach `most_bells` entries beyond the samples.
+  /// Another pixel. The arrays must last until fit() and reach `most_bells` entries beyond the samples.
   /// \param gray     samples of frames centre - reach() ... centre + reach(); any number where there is none
   /// \param present  for each of them 1 if it is there, else 0
-  void add(int centre, double log_width, const float* gray, const float* present);
+  /// \param late     for each of them [frames] by which it was exposed later; null for all pixels: not at all
+  void add(int centre, double log_width, const float* gray, const float* present, const float* late = nullptr);
+  /// [frames] Samples that were exposed more than this before or after their frame are none of a plain case.
+  double most_late() const { return most_late_; }
   /// Bells whose samples are all there.
   void fit();
   /// Bells of which some samples are missing.
@@ -50,6 +53,7 @@ class PlainBells {
  private:
   const BellTables& tables_;
   int margin_;  ///< [frames] the expected middle may be off
+  double most_late_;
   BellBatch batch_;
   BellBatch::Each<int> centre_{};
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/timing/tile_times_internal.h"
@@ -28,7 +29,8 @@ RecordedTimes::RecordedTimes(const Sequence& sequence, const StripeProfile& prof
                              const TimingOptions& options)
     : profile_(profile),
       noise_(noise),
-      judge_{profile, noise, sequence.count, options.min_amplitude, options.max_sigma, true},
+      // How many frames there will be is not known before the end.
+      judge_{profile, noise, std::numeric_limits<int>::max(), options.min_amplitude, options.max_sigma, true},
       tables_(profile, reach_around(profile)),
       recorder_(sequence, profile.full_width_half_maximum(),
                 PlainBells(tables_, noise, profile.full_width_half_maximum()).reach(), noise.read_variance),
@@ -122,6 +124,7 @@ void RecordedTimes::look(const Frames& frames, int end) {
 }
 
 void RecordedTimes::finish(const Frames& frames) {
+  judge_.frame_count = frames.count();
   recorder_.look(frames, frames.count(), true);
   std::vector<Tile*> to_measure, to_estimate;
   for (Tile& tile : tiles_)

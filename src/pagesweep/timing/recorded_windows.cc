@@ -46,6 +46,8 @@ PixelWindow RecordedWindows::window_at(int x, double width, int centre) {
   const int begin = std::max({0, first, centre - reach});
   const int end = std::min({sequence.count, first + windows_.length(), centre + reach + 1});
   gray_.clear();
+  late_.clear();
+  const bool is_even = windows_.are_even(begin, end - begin);
   with_gray(windows_, x, y_, [&](const auto* gray) {
     for (int i = begin; i < end; ++i) {
       const double value = gray[i - first];
@@ -53,9 +55,10 @@ PixelWindow RecordedWindows::window_at(int x, double width, int centre) {
       gray_.push_back(*windows_.present(i) == 0 ? not_a_number
                       : is_clipped              ? std::numeric_limits<float>::infinity()
                                                 : static_cast<float>(value - sequence.black_level));
+      if (!is_even) late_.push_back(*windows_.late(i));
     }
   });
-  return make_window(gray_, begin, centre, width, profile_, noise_);
+  return make_window(gray_, begin, centre, width, profile_, noise_, late_);
 }
 
 }  // namespace pagesweep

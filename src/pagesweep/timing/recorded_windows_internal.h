@@ -29,7 +29,7 @@ class RecordedWindows {
   const FrameNoise& noise_;
   const double reach_;
   int y_ = 0;
-  std::vector<float> gray_;
+  std::vector<float> gray_, late_;
 };
 
 }  // namespace pagesweep

@@ -27,12 +27,14 @@ PixelWindow RowWindows::window_at(int x, double width, int centre) {
   const int reach = static_cast<int>(std::ceil(reach_ * width));
   const int begin = std::max(0, centre - reach), end = std::min(frames_.count(), centre + reach + 1);
   gray_.clear();
+  late_.clear();
   for (int i = begin; i < end; ++i) {
     const float gray = samples_(x - left_, i);
     const bool is_naive = keep_clipped_ && std::isinf(gray);
     gray_.push_back(is_naive ? static_cast<float>((noise_.sensor().ceiling + 0.5) / noise_.exposure(i)) : gray);
+    if (!frames_.is_even()) late_.push_back(frames_.late(i));
   }
-  return make_window(gray_, begin, centre, width, profile_, noise_);
+  return make_window(gray_, begin, centre, width, profile_, noise_, late_);
 }
 
 }  // namespace pagesweep

@@ -35,7 +35,7 @@ class RowWindows {
   double rise_sigma_;
   int left_ = 0;  ///< column of samples_(0, i)
   Image<float> samples_;
-  std::vector<float> gray_;
+  std::vector<float> gray_, late_;
 };
 
 }  // namespace pagesweep

@@ -87,8 +87,13 @@ void StripeRecorder::look(const Frames& frames, int end, bool ended) {
   step.end = end;
   step.news = frames_done_;
   present_.resize(static_cast<std::size_t>(end), 0);
-  for (int i = frames_done_; i < end; ++i) present_[static_cast<std::size_t>(i)] = frames.has(i);
-  windows_.set_present(present_);
+  late_.resize(static_cast<std::size_t>(end), 0);
+  for (int i = frames_done_; i < end; ++i) {
+    present_[static_cast<std::size_t>(i)] = frames.has(i);
+    late_[static_cast<std::size_t>(i)] = frames.late(i);
+  }
+  windows_.set_frames(present_, late_);
+  if (ended) windows_.end_at(end);
   // What stands for a frame that was dropped may lie before.
   while (step.begin > 0 && !frames.has(step.begin)) --step.begin;
   bool any = false;

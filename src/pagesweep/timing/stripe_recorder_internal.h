@@ -74,6 +74,7 @@ class StripeRecorder {
   int ready_done_ = -1;  ///< place
   int frames_done_ = 0;
   std::vector<std::uint8_t> present_;
+  std::vector<float> late_;
 };
 
 }  // namespace pagesweep

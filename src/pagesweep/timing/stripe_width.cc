@@ -47,8 +47,8 @@ void measure_pixel(Row& row, int x, const StripeProfile& profile, const FrameNoi
                    std::vector<Measured>& values) {
   if (row.significance(x) < 15) return;  // its width would be worth little
   const PixelWindow window = row.window(x, 1);
-  const BellFit fit =
-      fit_bell(window.gray, window.first_frame, profile, noise, window.start, {.unknowns = BellUnknowns::width});
+  const BellFit fit = fit_bell(window.gray, window.first_frame, profile, noise, window.start,
+                               {.unknowns = BellUnknowns::width, .late = window.late});
   if (!fit.converged || fit.reduced_chi_square() > 100) return;
   // What a model cannot do better than a percent does not count more for being brighter.
   const double variance = fit.covariance(3, 3) + 1e-4;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/timing/stripe_windows_internal.h"
 
+#include <algorithm>
+#include <cstddef>
+
 #include "pagesweep/timing/bell_batch_internal.h"
 
 namespace pagesweep {
@@ -16,14 +19,21 @@ StripeWindows::StripeWindows(const Sequence& sequence, int half)
     gray_ = Image<std::uint8_t>(sequence.width * length(), sequence.height);
   else
     gray_ = Image<std::uint16_t>(sequence.width * length(), sequence.height);
-  set_present({});
+  set_frames({}, {});
 }
 
-void StripeWindows::set_present(std::span<const std::uint8_t> present) {
-  present_.assign(static_cast<std::size_t>(sequence_.count + 2 * margin_), 0.0F);
-  for (std::size_t i = 0; i < present.size(); ++i) present_[i + static_cast<std::size_t>(margin_)] = present[i];
+void StripeWindows::set_frames(std::span<const std::uint8_t> present, std::span<const float> late) {
+  const auto margin = static_cast<std::size_t>(margin_), size = present.size() + 2 * margin;
+  present_.assign(size, 0.0F);
+  late_.assign(size, 0.0F);
+  std::ranges::copy(present, present_.begin() + margin_);
+  std::ranges::copy(late, late_.begin() + margin_);
   absent_before_.assign(1, 0);
-  for (const float here : present_) absent_before_.push_back(absent_before_.back() + (here == 0 ? 1 : 0));
+  late_before_.assign(1, 0);
+  for (std::size_t i = 0; i < size; ++i) {
+    absent_before_.push_back(absent_before_.back() + (present_[i] == 0 ? 1 : 0));
+    late_before_.push_back(late_before_.back() + (late_[i] != 0 ? 1 : 0));
+  }
 }
 
 }  // namespace pagesweep

@@ -44,8 +44,19 @@ class StripeWindows {
     return absent_before_[begin] == absent_before_[begin + static_cast<std::size_t>(count)];
   }
 
-  /// Tells which frames there are.
-  void set_present(std::span<const std::uint8_t> present);
+  /// For frame `first` and those after it, how much later than that they were exposed [frames]. \pre first >= -half()
+  const float* late(int first) const { return &late_[static_cast<std::size_t>(first + margin_)]; }
+  /// Whether none of `count` frames was late.
+  bool are_even(int first, int count) const {
+    if (count <= 0) return true;
+    const auto begin = static_cast<std::size_t>(first + margin_);
+    return late_before_[begin] == late_before_[begin + static_cast<std::size_t>(count)];
+  }
+
+  /// Tells which frames there are, and when they were exposed.
+  void set_frames(std::span<const std::uint8_t> present, std::span<const float> late);
+  /// No frame from `count` on will come.
+  void end_at(int count) { sequence_.count = count; }
   void set(int x, int y, std::int32_t centre, float significance) {
     centre_(x, y) = centre;
     significance_(x, y) = significance;
@@ -64,6 +75,8 @@ class StripeWindows {
   Image<float> significance_;
   std::vector<float> present_;
   std::vector<int> absent_before_;  ///< how many of present_ before an entry are 0
+  std::vector<float> late_;
+  std::vector<int> late_before_;  ///< how many of late_ before an entry are not 0
 };
 
 }  // namespace pagesweep

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
 
 #include "pagesweep/timing/row_kernels_internal.h"
 
@@ -31,7 +32,9 @@ void TileTimes::estimate(int y, int left, int columns) {
   for (int first = left; first < left + columns; first += tile_pixels) {
     gather(y, first, std::min(tile_pixels, left + columns - first));
     if (candidates_.empty()) continue;
-    for (const bool whole : {true, false}) fit(whole, y);
+    for (const Sampling sampled : {Sampling::whole, Sampling::partial, Sampling::uneven}) fit(sampled, y);
+    for (const Candidate& candidate : candidates_)
+      if (sampling(candidate) == Sampling::too_uneven) set_time(map_, candidate.x, y, look_closely(candidate));
   }
 }
 
@@ -68,27 +71,34 @@ bool TileTimes::is_clipped(const Candidate& candidate) const {
   return false;
 }
 
-bool TileTimes::is_whole(const Candidate& candidate) const {
-  const int reach = bells_.reach(candidate.log_width);
-  return windows_.are_present(candidate.centre - reach, 2 * reach + 1);
+TileTimes::Sampling TileTimes::sampling(const Candidate& candidate) const {
+  const int reach = bells_.reach(candidate.log_width), first = candidate.centre - reach, count = 2 * reach + 1;
+  const bool is_whole = windows_.are_present(first, count);
+  if (windows_.are_even(first, count)) return is_whole ? Sampling::whole : Sampling::partial;
+  const std::span late(windows_.late(first), static_cast<std::size_t>(count));
+  const bool is_plain =
+      std::ranges::all_of(late, [most = bells_.most_late()](float frames) { return std::abs(frames) <= most; });
+  return is_plain ? Sampling::uneven : Sampling::too_uneven;
 }
 
-void TileTimes::fit(bool whole, int y) {
+void TileTimes::fit(Sampling sampled, int y) {
   bells_.clear();
   fitted_.clear();
   for (const Candidate& candidate : candidates_) {
-    if (is_whole(candidate) != whole) continue;
+    if (sampling(candidate) != sampled) continue;
     fitted_.push_back(candidate);
-    bells_.add(candidate.centre, candidate.log_width, candidate.light,
-               windows_.present(candidate.centre - windows_.half()));
+    const int first = candidate.centre - windows_.half();
+    bells_.add(candidate.centre, candidate.log_width, candidate.light, windows_.present(first),
+               sampled == Sampling::uneven ? windows_.late(first) : nullptr);
   }
   if (fitted_.empty()) return;
-  whole ? bells_.fit() : bells_.fit_partial();
+  sampled == Sampling::whole ? bells_.fit() : bells_.fit_partial();
   for (std::size_t i = 0; i < fitted_.size(); ++i) {
     const Candidate& candidate = fitted_[i];
     const PlainBells::Fit bell = bells_[static_cast<int>(i)];
     auto time = time_of_plain_bell(bell, std::exp(candidate.log_width), judge_);
-    if (time && time->status != PixelStatus::truncated && !whole && !is_recorded(*time, candidate.log_width))
+    if (time && time->status != PixelStatus::truncated && sampled != Sampling::whole &&
+        !is_recorded(*time, candidate.log_width))
       time->status = judge_partial(candidate, *time);
     if (!time) time = candidate.may_be_noise ? PixelTime{} : look_closely(candidate, &bell);
     set_time(map_, candidate.x, y, *time);

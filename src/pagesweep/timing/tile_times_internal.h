@@ -33,8 +33,10 @@ class TileTimes {
 
   void gather(int y, int left, int columns);
   bool is_clipped(const Candidate& candidate) const;
-  bool is_whole(const Candidate& candidate) const;
-  void fit(bool whole, int y);
+  /// How its samples were taken.
+  enum class Sampling { whole, partial, uneven, too_uneven };
+  Sampling sampling(const Candidate& candidate) const;
+  void fit(Sampling sampling, int y);
   /// \param plain  its fit as a plain case, which did not do; null: there is none
   PixelTime look_closely(const Candidate& candidate, const PlainBells::Fit* plain = nullptr);
   /// Whether every frame is there that shows something of the bell.

@@ -39,22 +39,22 @@ TimeStream::TimeStream(TimeStream&&) noexcept = default;
 TimeStream::~TimeStream() = default;
 
 void TimeStream::add(FrameSet set) {
+  // Once a frame comes, the lesson before it cannot be the last: whether more would come was not known then.
+  while (follows_ && !learned_ && next_lesson_ <= set.index)
+    learn(std::exchange(next_lesson_, next_lesson(next_lesson_)));
   for (std::size_t c = 0; c < frames_.size(); ++c) {
     if (!set.images[c]) continue;
-    frames_[c].set(set.index, *std::move(set.images[c]));
+    frames_[c].set(set.index, *std::move(set.images[c]), set.late_of(c));
     ++arrived_[c];
   }
   if (!follows_) return;
   const int end = set.index + 1;
-  while (!learned_ && next_lesson_ <= end) learn(std::exchange(next_lesson_, next_lesson(next_lesson_)));
   if (!learned_ || end - looked_at_ < frames_a_step) return;
   for (std::size_t c = 0; c < frames_.size(); ++c) look(c, end);
   looked_at_ = end;
 }
 
 void TimeStream::learn(int end) {
-  const bool is_all = std::ranges::all_of(frames_, [end](const Frames& frames) { return end >= frames.count(); });
-  if (is_all) return;
   auto stripe = learn_stripe_early(frames_, end);
   if (!stripe) return;
   learned_ = std::make_unique<Learned>(Learned{*std::move(stripe), {}});
@@ -90,7 +90,9 @@ double TimeStream::known_until() const {
 
 const TimeMap& TimeStream::so_far(std::size_t camera) const { return learned_->cameras[camera]->so_far(); }
 
-Timing TimeStream::finish(Progress& progress) {
+Timing TimeStream::finish(Progress& progress, std::optional<int> count) {
+  for (Frames& frames : frames_)
+    if (count) frames.end_at(*count);
   for (std::size_t c = 0; c < frames_.size(); ++c)
     if (dropped_frames(c) > 0)
       progress.warn(fmt::format("{}: {} of {} frames were dropped", frames_[c].sequence().camera, dropped_frames(c),

@@ -34,8 +34,9 @@ class TimeStream {
   const TimeMap& so_far(std::size_t camera) const;
 
   /// When the last frame is there. Once.
+  /// \param count  of the instants, where it was not known before; see FrameSource::sequences()
   /// \throws Error no_result  if no stripe passes
-  Timing finish(Progress& progress = no_progress());
+  Timing finish(Progress& progress = no_progress(), std::optional<int> count = std::nullopt);
 
   /// In how many frames each pixel of a camera is clipped (255: that many or more). After finish().
   Image<std::uint8_t> clipped_frames(std::size_t camera) const {
