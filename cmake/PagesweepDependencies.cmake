@@ -17,6 +17,7 @@ find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc calib3d features2d aruc
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(vips REQUIRED IMPORTED_TARGET vips-cpp)
 pkg_check_modules(openjpeg REQUIRED IMPORTED_TARGET libopenjp2)
+pkg_check_modules(aravis REQUIRED IMPORTED_TARGET aravis-0.8)
 pkg_check_modules(pangocairo REQUIRED IMPORTED_TARGET pangocairo)
 
 if(PAGESWEEP_BUILD_TESTS)

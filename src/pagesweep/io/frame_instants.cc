@@ -2,11 +2,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdint>
-#include <optional>
+#include <iterator>
 
 #include "pagesweep/base/error.h"
-#include "pagesweep/data/frame_beat.h"
+#include "pagesweep/data/trigger_times.h"
 #include "pagesweep/io/frame_instants_internal.h"
 
 namespace pagesweep {
@@ -14,38 +13,25 @@ namespace {
 
 constexpr int most_instants = 100'000;
 
-/// The clocks of a capture's cameras.
-class Clocks {
- public:
-  explicit Clocks(const Capture& capture) : capture_(capture) {}
-
-  std::optional<std::int64_t> stamp(std::size_t camera, int i) const {
-    const auto& stamps = capture_.sequences[camera].timestamps_ns;
-    if (stamps.empty() || stamps[static_cast<std::size_t>(i)] == no_timestamp) return std::nullopt;
-    return stamps[static_cast<std::size_t>(i)];
+/// What each camera's clock said of frame i.
+std::vector<Timestamp> stamps_of(const Capture& capture, int i) {
+  std::vector<Timestamp> stamps;
+  for (const SequenceFiles& files : capture.sequences) {
+    const auto k = static_cast<std::size_t>(i);
+    const bool is_known = !files.timestamps_ns.empty() && files.timestamps_ns[k] != no_timestamp;
+    stamps.push_back(is_known ? Timestamp(files.timestamps_ns[k]) : std::nullopt);
   }
-  /// When frame i was exposed by the first camera's clock; nothing if no camera tells.
-  std::optional<std::int64_t> time_ns(int i) const {
-    for (std::size_t c = 0; c < capture_.sequences.size(); ++c)
-      if (const auto own = stamp(c, i)) return *own - (c == 0 || !capture_.is_triggered ? 0 : ahead_ns(c, i));
-    return std::nullopt;
-  }
+  return stamps;
+}
 
- private:
-  /// By how much a camera's clock is ahead of the first one's, from the nearest frame that both have.
-  std::int64_t ahead_ns(std::size_t camera, int i) const {
-    const int count = capture_.sequences[0].count;
-    for (int distance = 1; distance < count; ++distance)
-      for (const int near : {i - distance, i + distance}) {
-        if (near < 0 || near >= count) continue;
-        const auto first = stamp(0, near), own = stamp(camera, near);
-        if (first && own) return *own - *first;
-      }
-    return 0;
+/// The first trigger that all cameras saw; one that none did if there is none.
+std::vector<Timestamp> first_common(const Capture& capture) {
+  for (int i = 0; i < capture.sequences[0].count; ++i) {
+    auto stamps = stamps_of(capture, i);
+    if (std::ranges::all_of(stamps, [](const Timestamp& stamp) { return stamp.has_value(); })) return stamps;
   }
-
-  const Capture& capture_;
-};
+  return std::vector<Timestamp>(capture.sequences.size());
+}
 
 double interval_of(const Capture& capture) {
   if (capture.frame_interval_ns > 0) return capture.frame_interval_ns;
@@ -65,17 +51,6 @@ std::vector<Instant> one_after_the_other(int count) {
   return instants;
 }
 
-/// How much later than the instant each camera's frame was exposed.
-std::vector<float> late_frames(const Capture& capture, const Clocks& clocks, int i, const FrameBeat& beat,
-                               const FrameBeat::Place& place) {
-  std::vector<float> late(capture.sequences.size(), static_cast<float>(place.late));
-  if (!capture.is_triggered)
-    for (std::size_t c = 0; c < late.size(); ++c)
-      if (const auto own = clocks.stamp(c, i)) late[c] = static_cast<float>(beat.time_of(*own) - place.index);
-  if (std::ranges::all_of(late, [](float frames) { return frames == 0; })) return {};
-  return late;
-}
-
 }  // namespace
 
 std::vector<Instant> instants_of(const Capture& capture) {
@@ -83,20 +58,19 @@ std::vector<Instant> instants_of(const Capture& capture) {
   const bool has_times =
       std::ranges::any_of(capture.sequences, [](const SequenceFiles& files) { return !files.timestamps_ns.empty(); });
   if (!has_times) return one_after_the_other(count);
-  const Clocks clocks(capture);
-  FrameBeat beat(interval_of(capture));
+  TriggerTimes times(interval_of(capture), capture.is_triggered, first_common(capture));
   std::vector<Instant> instants;
   for (int i = 0; i < count; ++i) {
-    const auto time_ns = clocks.time_ns(i);
-    if (!time_ns) continue;
-    const auto place = beat.place(*time_ns);
+    const auto stamps = stamps_of(capture, i);
+    if (std::ranges::none_of(stamps, [](const Timestamp& stamp) { return stamp.has_value(); })) continue;
+    auto place = times.place(stamps);
     if (!place || place->index >= most_instants)
       throw bad_input(capture.folder / "capture.json", "sequences",
                       fmt::format("the \"timestamps_ns\" of frame {} do not follow those before: expected ascending "
                                   "times of one sweep, {} ns from one to the next",
-                                  i, beat.interval_ns()));
+                                  i, times.interval_ns()));
     while (static_cast<int>(instants.size()) < place->index) instants.push_back({static_cast<int>(instants.size())});
-    instants.push_back({place->index, i, late_frames(capture, clocks, i, beat, *place)});
+    instants.push_back({place->index, i, std::move(place->late)});
   }
   return instants;
 }

@@ -56,7 +56,7 @@ class RecordingWriter {
   RecordingWriter& operator=(const RecordingWriter&) = delete;
 
   /// The next page.
-  /// \throws Error  if it cannot be written
+  /// \throws Error  if it cannot be written; the pages before it can still be committed
   /// \throws std::invalid_argument  if its size or depth is another, or there are most_frames already
   void append(const GrayImage& frame);
   /// To be called after the last frame, of which there must be one at least.

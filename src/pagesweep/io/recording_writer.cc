@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -78,6 +80,12 @@ struct RecordingWriter::State {
   void write(std::span<const std::byte> bytes) const {
     if (!descriptor.write(bytes)) throw cannot_write(output.target(), message_of(errno));
   }
+  /// Takes back what was written after the last whole frame, so that a full disk has room for the end of the file.
+  void take_back() const {
+    const std::uint64_t end = frames == 0 ? pixels_at(0) : directory_at(frames - 1);
+    if (::ftruncate(descriptor.number(), static_cast<off_t>(end)) == 0)
+      ::lseek(descriptor.number(), static_cast<off_t>(end), SEEK_SET);
+  }
   void write_header() const;
   void write_directory(int frame, bool is_last) const;
 };
@@ -144,10 +152,15 @@ void RecordingWriter::append(const GrayImage& frame) {
   if (width_of(frame) != state.size.width || height_of(frame) != state.size.height || bits != state.sample_bits)
     throw std::invalid_argument("RecordingWriter::append: the frame's size or depth is not the recording's");
   if (state.frames == state.most_frames) throw std::invalid_argument("RecordingWriter::append: more than most_frames");
-  if (state.frames > 0) state.write_directory(state.frames - 1, false);
-  std::visit([&](const auto& image) { state.write(std::as_bytes(image.pixels())); }, frame);
-  const std::vector<std::byte> padding(aligned(state.pixel_bytes()) - state.pixel_bytes());
-  state.write(padding);
+  try {
+    if (state.frames > 0) state.write_directory(state.frames - 1, false);
+    std::visit([&](const auto& image) { state.write(std::as_bytes(image.pixels())); }, frame);
+    const std::vector<std::byte> padding(aligned(state.pixel_bytes()) - state.pixel_bytes());
+    state.write(padding);
+  } catch (const Error&) {
+    state.take_back();
+    throw;
+  }
   ++state.frames;
 }
 
