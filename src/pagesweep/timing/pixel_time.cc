@@ -76,6 +76,21 @@ bool is_too_faint(const Bell& bell, double sigma, const PixelJudge& judge) {
   return bell.amplitude < std::max(judge.min_amplitude, least_amplitude) || sigma > judge.max_sigma;
 }
 
+/// [frames] by which a bell is later than eq. 3 finds it, which takes all frames to be exposed evenly: how late the
+/// samples were that tell its time, each as much as it tells.
+double mean_lateness(const PixelWindow& window, const Bell& bell, const StripeProfile& profile) {
+  if (window.late.empty()) return 0;
+  double sum = 0, weights = 1e-12;
+  for (std::size_t k = 0; k < window.gray.size(); ++k) {
+    if (!std::isfinite(window.gray[k])) continue;
+    const double frame = window.first_frame + static_cast<double>(k);
+    const double slope = profile.derivative((frame - bell.time) / bell.width);
+    weights += slope * slope;
+    sum += slope * slope * window.late_of(k);
+  }
+  return sum / weights;
+}
+
 /// The bell's middle part on a curved background. Half a width at half height beyond the half-height points a bell has
 /// nearly ended; a wider piece would need a more flexible background.
 BellFit fit_core(const PixelWindow& window, const BellFit& first, const PixelJudge& judge) {
@@ -206,14 +221,8 @@ PixelTime time_by_shift(const PixelWindow& window, const PixelJudge& judge) {
                           : PixelStatus::truncated;
     return unsolved;
   }
-  // Eq. 3 knows whole frames only: between two that were late, the bell is.
-  const double frame = shift->c + before;
-  const auto last = static_cast<double>(std::max<std::size_t>(window.gray.size(), 2) - 2);
-  const auto below = static_cast<std::size_t>(std::clamp(std::floor(frame), 0.0, last));
-  const double late = window.late.empty() ? 0
-                                          : std::lerp(window.late_of(below), window.late_of(below + 1),
-                                                      frame - static_cast<double>(below));
-  const Bell bell{shift->a, shift->b, frame + window.first_frame + late, width};
+  Bell bell{shift->a, shift->b, shift->c + window.first_frame + before, width};
+  bell.time += mean_lateness(window, bell, judge.profile);
   const double noise = std::sqrt(judge.noise.sensor().variance(bell.background + 0.5 * bell.amplitude));
   // What the noise alone would leave. Eq. 9's own residuals know less: the noise in its matrix passes for slope.
   const BellFit at_bell = fit_bell(window.gray, window.first_frame, judge.profile, judge.noise, bell,

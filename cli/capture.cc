@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// pagesweep capture: a sweep from live cameras, recorded.
+#include <fmt/format.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "cli/command.h"
+#include "cli/exit_code.h"
+#include "cli/live_input.h"
+#include "cli/option_visitor.h"
+#include "cli/output_folder.h"
+#include "pagesweep/io/image_file.h"
+#include "pagesweep/io/rig_file.h"
+#include "pagesweep/live/record_capture.h"
+
+namespace pagesweep::cli {
+namespace {
+
+struct Arguments {
+  CommonOptions common;
+  LiveInput input;
+  std::filesystem::path rig;
+  std::filesystem::path output;
+};
+
+nlohmann::ordered_json to_json(const LiveStatus& status) {
+  nlohmann::ordered_json cameras = nlohmann::ordered_json::array();
+  for (const auto& camera : status.cameras)
+    cameras.push_back({{"name", camera.name},
+                       {"received", camera.counts.received},
+                       {"damaged", camera.counts.damaged},
+                       {"lost", camera.counts.lost},
+                       {"unpaired", camera.counts.unpaired},
+                       {"late", camera.counts.late}});
+  return cameras;
+}
+
+/// Without a picture, frames alone can still be measured.
+std::string take_picture(ScanPictureSource& scanner, Capture& capture) {
+  try {
+    const Picture picture = scanner.finish(std::chrono::milliseconds(2000));
+    write_picture(capture.folder / "scan.tif", picture);
+    capture.scan = "scan.tif";
+    return {};
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+void run(const Arguments& arguments) {
+  const Rig rig = read_rig(arguments.rig);
+  if (std::filesystem::exists(arguments.output / "capture.json"))
+    throw pagesweep::cannot_write(arguments.output, "there is a capture already, which is never overwritten: name a new folder");
+  OutputFolder output(arguments.output, "capture.json");
+  LiveView view(arguments.common.quiet);
+  OpenedRig opened = open(arguments.input, rig, view);
+  CaptureRecorder recorder(output.path(), opened.source->sequences());
+  RecordedSource source(*opened.source, recorder, true);
+  while (source.next()) {
+  }
+  const LiveStatus status = opened.source->status();
+  Capture capture = describe_capture(output.path(), recorder.finish(), *opened.source);
+  std::string problem = opened.source->ended_early().empty() ? recorder.trouble() : opened.source->ended_early();
+  if (opened.scanner && problem.empty()) problem = take_picture(*opened.scanner, capture);
+  if (!problem.empty()) capture.notes = "partial: " + problem;
+  write_rig(output.path() / "rig.json", rig);
+  write_devices(output.path() / "devices.json", opened.devices);
+  write_capture(capture);
+  output.finish();
+  view.finish(status);
+  print_answer(arguments.common,
+               {{"capture", output.path().string()},
+                {"frames", capture.sequences[0].count},
+                {"cameras", to_json(status)},
+                {"partial", problem}},
+               fmt::format("{}: {} cameras, {} triggers{}\n", output.path().string(), capture.sequences.size(),
+                           capture.sequences[0].count, problem.empty() ? "" : "; partial: " + problem));
+  if (!problem.empty()) throw pagesweep::cannot_read(output.path(), "the capture is partial: " + problem);
+}
+
+}  // namespace
+
+void add_capture_command(CLI::App& app) {
+  auto* command = app.add_subcommand("capture", R"(Record a sweep from live cameras.
+
+Sets the cameras as devices.json says, waits for the stripe of light, records it and ends by itself
+when it has left. Frames of the cameras are paired by trigger and time; what was lost is counted. The
+folder is a capture that `pagesweep scan` reads, with the rig, the settings as the cameras took them
+and, if there is a scanner, its picture. If a camera stops in the middle or the disk is full, what
+was recorded until then is kept, capture.json says why it is partial, and the exit status is 4.
+)");
+  const auto arguments = std::make_shared<Arguments>();
+  arguments->input.add_to(*command);
+  command->add_option("--rig", arguments->rig, "the rig whose cameras these are")->required()->option_text("<file>");
+  add_output(*command, arguments->output, "where the capture goes");
+  add_common_options(*command, arguments->common);
+  command->footer(R"(Examples:
+  pagesweep capture --camera cam1=192.168.3.2 --camera cam2=192.168.3.3 --rig rig.json -o sweep
+  pagesweep capture --camera cam1=127.0.0.1 --camera cam2=127.0.0.2 --scanner line=127.0.0.3 \
+                    --devices devices.json --rig rig.json -o sweep     # of `pagesweep fake-rig`
+)");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pagesweep::cli
