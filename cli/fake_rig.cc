@@ -69,9 +69,7 @@ camera at the next address. They are wired to one trigger line, "Line0", and beg
 all cameras have been started. With it everything can be tried without hardware. Ends when it is
 interrupted, and says then how many frames it sent.
 
-The addresses must be this computer's; apart from the rest of the network they are so in
-
-  unshare -rn sh -c 'ip link set lo up; for n in 2 3; do ip address add 127.0.0.$n/8 dev lo; done; exec sh'
+The addresses must be this computer's: scripts/own-network runs a shell in which they are.
 )");
   const auto arguments = std::make_shared<Arguments>();
   add_input(*command, "CAPTURE", arguments->capture, "folder with capture.json, or that file");
