@@ -85,10 +85,10 @@ void add_capture_command(CLI::App& app) {
   auto* command = app.add_subcommand("capture", R"(Record a sweep from live cameras.
 
 Sets the cameras as devices.json says, waits for the stripe of light, records it and ends by itself
-when it has left. Frames of the cameras are paired by trigger and time; what was lost is counted. The
-folder is a capture that `pagesweep scan` reads, with the rig, the settings as the cameras took them
-and, if there is a scanner, its picture. If a camera stops in the middle or the disk is full, what
-was recorded until then is kept, capture.json says why it is partial, and the exit status is 4.
+when it has left. Frames of the cameras are paired by trigger and time; what was lost is counted.
+The folder is a capture that `pagesweep scan` reads, with the rig, the settings as the cameras took
+them and, if there is a scanner, its picture. If a camera stops in the middle or the disk is full,
+what was recorded until then is kept, capture.json says why it is partial, and the exit status is 4.
 )");
   const auto arguments = std::make_shared<Arguments>();
   arguments->input.add_to(*command);

@@ -137,6 +137,8 @@ class CaptureSource : public FrameSource {
       sequences_.push_back(on_instants(make_sequence(files, *camera), instants_));
       cameras_.push_back(open_frames(capture, files, {camera->width, camera->height}));
     }
+    // What live cameras do not tell of, a recording does not either: step by step both are used alike.
+    std::erase_if(instants_, [](const Instant& instant) { return instant.number < 0; });
     reader_ = std::jthread([this](const std::stop_token& stop) { read_ahead(stop); });
   }
 
@@ -194,7 +196,7 @@ class CaptureSource : public FrameSource {
         const auto camera = static_cast<std::size_t>(k % cameras);
         const int i = begin + k / cameras;
         const int number = instants_[static_cast<std::size_t>(i)].number;
-        if (number >= 0) sets[static_cast<std::size_t>(k / cameras)].images[camera] = cameras_[camera]->read(number);
+        sets[static_cast<std::size_t>(k / cameras)].images[camera] = cameras_[camera]->read(number);
       } catch (...) {
         errors[static_cast<std::size_t>(k)] = std::current_exception();
       }
