@@ -39,6 +39,7 @@ void add_convert_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_rig_command(CLI::App& app);
 void add_info_command(CLI::App& app);
+void add_expose_command(CLI::App& app);
 void add_cameras_command(CLI::App& app);
 void add_capture_command(CLI::App& app);
 void add_fake_rig_command(CLI::App& app);

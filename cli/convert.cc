@@ -51,9 +51,10 @@ void run(const Arguments& arguments) {
 void add_convert_command(CLI::App& app) {
   auto* command = app.add_subcommand("convert", R"(Copy a capture, with its frames stored in another way.
 
-Nothing is lost unless --drop or --lose say so: gray values, dropped frames, exposures and notes stay what they are; the rig, the
-scan and the folder truth/ are copied as they are. A recording is one file a camera, larger than
-PNGs and read many times faster. The output folder has to be new or empty.
+Nothing is lost unless --drop or --lose say so: gray values, dropped frames, exposures, times and
+notes stay what they are; the rig, the scan and the folder truth/ are copied as they are. A
+recording is one file a camera, larger than PNGs and read many times faster. The output folder has
+to be new or empty.
 )");
   const auto arguments = std::make_shared<Arguments>();
   add_input(*command, "CAPTURE", arguments->capture, "folder with capture.json, or that file");

@@ -67,15 +67,19 @@ std::unique_ptr<ScanPictureSource> open_scanner(const std::string& scanner, cons
 
 void LiveInput::add_to(CLI::App& command) {
   command.add_option("--camera", cameras, "a camera: its name in the rig, and its id or address; once for each")
-      ->option_text("<name=id>");
+      ->option_text("<name=id>")
+      ->group("Live");
   command
       .add_option(
           "--scanner", scanner,
           "where the scanner's picture comes from: line=ID, a GenICam line camera, or folder=DIR, into which the "
           "scanner's own software puts it")
-      ->option_text("<line=id>");
-  command.add_option("--devices", devices, "devices.json: how the cameras are to be set")->option_text("<file>");
-  options.describe(OptionVisitor(command, "Sweep"));
+      ->option_text("<line=id>")
+      ->group("Live");
+  command.add_option("--devices", devices, "devices.json: how the cameras are to be set")
+      ->option_text("<file>")
+      ->group("Live");
+  options.describe(OptionVisitor(command, "Live"));
 }
 
 OpenedRig open(const LiveInput& input, const Rig& rig, LiveView& view) {

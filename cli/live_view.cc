@@ -5,9 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "cli/interrupt.h"
+#include "pagesweep/data/time_map.h"
 
 namespace pagesweep::cli {
 namespace {
@@ -67,7 +70,8 @@ void LiveView::draw(const LiveStatus& status) {
     }
     fmt::print(stderr, "  [{}] {}\n", bar, cli::describe(status.cameras[c]));
   }
-  lines_drawn_ = 1 + static_cast<int>(status.cameras.size());
+  for (const std::string& row : relief_) fmt::print(stderr, "  {}\n", row);
+  lines_drawn_ = 1 + static_cast<int>(status.cameras.size() + relief_.size());
 }
 
 void LiveView::show(const LiveStatus& status) {
@@ -88,6 +92,32 @@ void LiveView::show(const LiveStatus& status) {
     last_line_ = now;
   }
   state_ = status.state;
+}
+
+void LiveView::show(const PointMap& points) {
+  constexpr int columns = 56, rows = 16;
+  constexpr std::string_view letters = ".:-=+*#%@";
+  const auto now = std::chrono::steady_clock::now();
+  if (!terminal_ || now - last_relief_ < std::chrono::milliseconds(300)) return;
+  last_relief_ = now;
+  Image<float> heights(columns, rows, not_a_number);
+  float low = std::numeric_limits<float>::infinity(), high = -low;
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      const int u = (2 * x + 1) * points.width() / (2 * columns), v = (2 * y + 1) * points.height() / (2 * rows);
+      if (points.status(u, v) != PixelStatus::ok) continue;
+      const float z = heights(x, y) = points.z(u, v);
+      low = std::min(low, z), high = std::max(high, z);
+    }
+  const float step = std::max(high - low, 5.0F) / static_cast<float>(letters.size());  // [mm] a flat sheet stays even
+  relief_.assign(rows, std::string(columns, ' '));
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x)
+      if (std::isfinite(heights(x, y))) {
+        const auto level = static_cast<std::size_t>((heights(x, y) - low) / step);
+        relief_[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] =
+            letters[std::min(level, letters.size() - 1)];
+      }
 }
 
 void LiveView::finish(const LiveStatus& status) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pagesweep/data/time_map.h"
+#include "pagesweep/data/point_map.h"
 #include "pagesweep/live/live_source.h"
 
 namespace pagesweep::cli {
@@ -18,6 +18,8 @@ class LiveView {
   ~LiveView();
 
   void show(const LiveStatus& status);
+  /// The surface so far, as one camera sees it.
+  void show(const PointMap& points);
   /// Ends the picture, and says how it went.
   void finish(const LiveStatus& status);
   /// Everything that the operator was warned of.
@@ -32,6 +34,8 @@ class LiveView {
   int lines_drawn_ = 0;
   std::optional<SweepWatch::State> state_;
   std::chrono::steady_clock::time_point last_line_;
+  std::chrono::steady_clock::time_point last_relief_;
+  std::vector<std::string> relief_;  ///< the surface in letters, higher ones brighter
   std::vector<std::string> passed_;  ///< rows of a small picture of each camera: where the stripe has been
   std::vector<std::string> remarks_;
 };

@@ -51,6 +51,7 @@ void add_commands(CLI::App& app) {
   add_check_command(app);
   add_rig_command(app);
   add_info_command(app);
+  add_expose_command(app);
   add_cameras_command(app);
   add_capture_command(app);
   add_fake_rig_command(app);

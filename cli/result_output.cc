@@ -9,6 +9,7 @@
 
 #include "cli/exit_code.h"
 #include "pagesweep/io/atomic_file.h"
+#include "pagesweep/timing/advise_exposure.h"
 
 namespace pagesweep::cli {
 namespace {
@@ -56,6 +57,16 @@ std::vector<Figure> figures_of(const LightSweep& sweep) {
            "mm", ""}};
 }
 
+void add_figures(std::vector<Figure>& figures, const ExposureAdvice& advice, const std::string& camera) {
+  figures.push_back({camera, "clipped_share", "pixels that the stripe passed and that were clipped",
+                     100 * advice.clipped_share, "%", ""});
+  figures.push_back(
+      {camera, "dark_share", "pixels that the stripe passed and that were too dark", 100 * advice.dark_share, "%", ""});
+  figures.push_back({camera, "light_factor",
+                     "the light, by exposure or gain, that would use the range well, over that which there was",
+                     advice.light_factor, "", ""});
+}
+
 std::vector<CameraReport> cameras_of(const RunResult& result) {
   const Measurement& measurement = result.measurement;
   std::vector<CameraReport> cameras;
@@ -68,6 +79,11 @@ std::vector<CameraReport> cameras_of(const RunResult& result) {
     if (measurement.timing) {
       camera.times = &measurement.timing->maps[c];
       camera.figures = figures_of(measurement.timing->noise[c], camera.name);
+      if (c < result.sequences.size())
+        add_figures(camera.figures,
+                    advise_exposure(result.sequences[c], measurement.timing->maps[c], measurement.clipped_frames[c],
+                                    measurement.timing->profile),
+                    camera.name);
     }
     if (c < measurement.edges.size()) add_figures(camera.figures, measurement.edges[c], camera.name);
     if (c < measurement.fusion.size()) add_figures(camera.figures, measurement.fusion[c], camera.name);

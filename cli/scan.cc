@@ -8,6 +8,7 @@
 #include "cli/option_visitor.h"
 #include "cli/output_folder.h"
 #include "cli/result_output.h"
+#include "cli/scan_live.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/io/image_file.h"
 #include "pagesweep/pipeline/results.h"
@@ -18,13 +19,23 @@ namespace {
 struct Arguments {
   CommonOptions common;
   CaptureInput input;
+  bool live = false;
+  LiveInput cameras;
+  std::filesystem::path record;
   std::filesystem::path output;
   ScanOptions options;
   PageFileOptions files;
   QualityArguments quality;
 };
 
+void run_live(const Arguments& arguments) {
+  scan_live({arguments.common, arguments.cameras, arguments.input.rig, arguments.input.picture, arguments.record,
+             arguments.output, arguments.options, arguments.files});
+}
+
 void run(const Arguments& arguments) {
+  if (arguments.live) return run_live(arguments);
+  if (arguments.input.capture.empty()) throw CLI::ValidationError("CAPTURE", "name one, or take a sweep with --live");
   check(arguments.files);
   const ThreadLimit limit(arguments.common.threads);
   ConsoleProgress progress(arguments.common.quiet);
@@ -75,6 +86,12 @@ Reads a capture (the frames of both cameras, the scanner's picture and the rig) 
   arguments->input.add_to(*command);
   arguments->input.add_picture_to(*command);
   add_output(*command, arguments->output, "where the result goes");
+  command->get_option("CAPTURE")->required(false);
+  command->add_flag("--live", arguments->live, "measure a sweep of live cameras while it goes on")->group("Live");
+  command->add_option("--record", arguments->record, "keep the frames as a capture there")
+      ->option_text("<folder>")
+      ->group("Live");
+  arguments->cameras.add_to(*command);
   arguments->options.describe_measurement(OptionVisitor(*command, "Measuring"));
   arguments->options.describe_pages(OptionVisitor(*command, "Flattening"));
   arguments->files.describe(OptionVisitor(*command, "Files"));
@@ -84,6 +101,8 @@ Reads a capture (the frames of both cameras, the scanner's picture and the rig) 
   pagesweep scan capture -o result
   pagesweep scan capture -o result --dpi 400 --format tiff
   pagesweep scan capture -o plain --no-difference-vector   # the model alone: see what dents do
+  pagesweep scan --live --camera cam1=192.168.3.2 --camera cam2=192.168.3.3 \
+                 --scanner line=192.168.3.4 --rig rig.json -o result
 )");
   command->callback([arguments] { run(*arguments); });
 }

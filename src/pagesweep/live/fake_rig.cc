@@ -132,7 +132,9 @@ class FakeCamera {
     std::int64_t timestamp_ns = next_timestamp_ns_;
     if (!is_wired_) {
       const std::int64_t period_ns = std::max<std::int64_t>(1, read(device(), period_register)) * 1000;
-      timestamp_ns = (g_get_real_time() * 1000 + period_ns / 2) / period_ns * period_ns;
+      const bool is_triggered = read(device(), trigger_mode_register) == 1;
+      timestamp_ns = g_get_real_time() * 1000;
+      if (!is_triggered) timestamp_ns = (timestamp_ns + period_ns / 2) / period_ns * period_ns;
       const std::int64_t begin_ns = sweep_begin_ns_;
       frame = begin_ns > 0 ? std::lround(static_cast<double>(timestamp_ns - begin_ns) / static_cast<double>(period_ns))
                            : -1;

@@ -232,6 +232,12 @@ void GenicamCamera::stop() {
   g_clear_error(&ignored);
 }
 
+void GenicamCamera::abandon() {
+  state_->is_running = false;
+  static_cast<void>(state_->stream.release());
+  static_cast<void>(state_->camera.release());
+}
+
 void GenicamCamera::trigger() {
   GError* ignored = nullptr;  // a trigger that was lost is a frame that does not come
   arv_camera_software_trigger(state_->camera.get(), &ignored);
@@ -270,6 +276,7 @@ bool GenicamCamera::receive(std::chrono::milliseconds longest, const std::functi
 
 std::uint64_t GenicamCamera::underruns() const {
   guint64 completed = 0, failed = 0, missed = 0;
+  if (!state_->stream) return 0;
   arv_stream_get_statistics(state_->stream.get(), &completed, &failed, &missed);
   return missed;
 }

@@ -61,6 +61,9 @@ class GenicamCamera {
 
   void start();
   void stop();
+  /// Never speaks to it again, not even to take leave: one that is gone would be waited for for seconds. What it takes
+  /// stays allocated.
+  void abandon();
   /// Exposes a frame, where the trigger is software.
   void trigger();
   /// Waits for the next buffer.

@@ -8,6 +8,7 @@
 #include <deque>
 #include <exception>
 #include <mutex>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -27,6 +28,7 @@ constexpr auto between_statuses = milliseconds(200);
 constexpr double usual_rate_hz = 30;        ///< of software triggers
 constexpr std::size_t most_waiting = 1000;  ///< frames a camera
 constexpr double clearly_slower = 0.8;
+constexpr std::size_t numbers_kept = 256;
 
 double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
@@ -46,8 +48,10 @@ class Feed {
   void stop() {
     thread_.request_stop();
     if (thread_.joinable()) thread_.join();
-    camera_->stop();
+    is_gone_ ? camera_->abandon() : camera_->stop();
   }
+  /// It does not answer any more.
+  void give_up() { is_gone_ = true; }
   GenicamCamera& camera() { return *camera_; }
 
   // What follows needs the mutex.
@@ -68,6 +72,9 @@ class Feed {
     if (raw.is_whole) frame.image = to_gray_image(raw, camera_->bit_depth());
     const std::lock_guard lock(mutex_);
     frame.number = counter_.count(raw.id);
+    // Packets that are late enough make a second buffer of the same frame.
+    if (!seen_.insert(frame.number).second) return;
+    if (seen_.size() > numbers_kept) seen_.erase(seen_.begin());
     last_ = raw.arrival;
     recent_.push_back(raw.arrival);
     while (recent_.back() - recent_.front() > std::chrono::seconds(1)) recent_.pop_front();
@@ -84,6 +91,8 @@ class Feed {
   std::mutex& mutex_;
   std::condition_variable& arrived_;
   FrameCounter counter_;
+  std::set<std::int64_t> seen_;  ///< numbers of the latest frames
+  bool is_gone_ = false;
   Clock::time_point started_, last_;
   std::deque<Clock::time_point> recent_;
   std::jthread thread_;
@@ -115,11 +124,12 @@ struct LiveSource::State {
   std::deque<Instant> ready;  ///< before the sweep: the frames that go before it
   std::vector<Timestamp> stamps;
   Clock::time_point started, last_status, sweep_begun;
-  bool is_done = false, is_triggered = true;
+  bool is_done = false, is_stopping = false, is_triggered = true;
   int count = 0;
   std::string ended_early;
   std::vector<std::string> remarks;
   std::vector<bool> is_slow;
+  std::jthread stopper;  ///< stops the cameras while their frames are still being used
 
   State(std::vector<Sequence> of_cameras, const LiveOptions& given, double interval_ns)
       : sequences(std::move(of_cameras)),
@@ -138,6 +148,7 @@ struct LiveSource::State {
   void look_for_faults(Clock::time_point now);
   void fail(const std::string& what);
   void finish();
+  void stop();
   LiveStatus status() const;
   void report(Clock::time_point now);
 };
@@ -242,6 +253,7 @@ void LiveSource::State::look_for_faults(Clock::time_point now) {
       if (all_silent && is_wired && watch.state() == SweepWatch::State::waiting) continue;  // nobody triggers yet
       if (all_silent && is_wired)
         return fail("the triggers have ended before the stripe had left: let them run on until it has");
+      feeds[c]->give_up();
       return fail(fmt::format("{}: it has stopped sending frames after {}: see to its power, cable and temperature",
                               name, feeds[c]->whole));
     } else if (!is_slow[c] && now - started > longest_start && feeds[c]->rate_hz() < clearly_slower * fastest) {
@@ -264,10 +276,15 @@ void LiveSource::State::look_for_faults(Clock::time_point now) {
 }
 
 void LiveSource::State::finish() {
+  for (Sequence& sequence : sequences) sequence.count = count;
+  if (!is_stopping) stopper = std::jthread([this] { stop(); });
+  is_stopping = true;
+}
+
+void LiveSource::State::stop() {
   trigger_thread.request_stop();
   if (trigger_thread.joinable()) trigger_thread.join();
   for (auto& feed : feeds) feed->stop();
-  for (Sequence& sequence : sequences) sequence.count = count;
 }
 
 LiveStatus LiveSource::State::status() const {
@@ -307,7 +324,10 @@ LiveSource::LiveSource(std::vector<std::unique_ptr<GenicamCamera>> cameras, std:
   state_->start();
 }
 
-LiveSource::~LiveSource() { state_->finish(); }
+LiveSource::~LiveSource() {
+  state_->finish();
+  if (state_->stopper.joinable()) state_->stopper.join();
+}
 
 const std::vector<Sequence>& LiveSource::sequences() const { return state_->sequences; }
 const std::vector<Timestamp>& LiveSource::timestamps() const { return state_->stamps; }
@@ -315,6 +335,7 @@ double LiveSource::interval_ns() const { return state_->pairing.interval_ns(); }
 bool LiveSource::is_triggered() const { return state_->is_triggered; }
 const std::string& LiveSource::ended_early() const { return state_->ended_early; }
 LiveStatus LiveSource::status() const {
+  if (state_->stopper.joinable()) state_->stopper.join();
   const std::lock_guard lock(state_->mutex);
   return state_->status();
 }

@@ -212,6 +212,7 @@ std::vector<TimeMap> follow_stripe(FrameSource& source, const Stage& stage, cons
     if (!std::isfinite(until)) return;
     if (!points) begin();
     points->follow({&times.so_far(0), &times.so_far(1)}, until);
+    if (stage.options.on_points) stage.options.on_points(points->so_far(0));
   });
   if (!points) begin();
   std::vector<TimeMap> seen(2);

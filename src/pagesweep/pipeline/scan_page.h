@@ -51,6 +51,8 @@ struct ScanOptions {
   TriangulationOptions triangulation;
   SurfaceOptions surface;
   DewarpOptions dewarp;
+  /// Is shown a camera's points while they grow, without intensities; an exception ends the run.
+  std::function<void(const PointMap&)> on_points = {};
 
   /// \see base/options.h
   template <class Visitor>
