@@ -68,6 +68,7 @@ class Feed {
 
  private:
   void take(const RawFrame& raw) {
+    if (raw.id == 0) return;  // no frame has it: a buffer of which not even the beginning came, as the count will tell
     LiveFrame frame{0, raw.timestamp_ns, raw.arrival, {}};
     if (raw.is_whole) frame.image = to_gray_image(raw, camera_->bit_depth());
     const std::lock_guard lock(mutex_);
