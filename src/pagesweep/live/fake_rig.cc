@@ -103,12 +103,15 @@ class FakeCamera {
   /// \param frame         of the capture; negative or beyond its end: dark
   /// \param timestamp_ns  by the rig's clock
   void trigger(long frame, std::int64_t timestamp_ns) {
-    next_frame_ = frame;
-    next_timestamp_ns_ = timestamp_ns;
+    {
+      const std::lock_guard lock(mutex_);
+      next_ = {frame, timestamp_ns};
+      is_busy_ = true;
+    }
     arv_fake_camera_write_register(device(), software_trigger_register, 1);
   }
   /// Whether it has not yet acted on the last trigger.
-  bool is_busy() const { return read(device(), software_trigger_register) != 0; }
+  bool is_busy() const { return is_busy_; }
   /// The sweep begins, for a camera that is not triggered by the line.
   void begin_sweep(std::int64_t begin_ns) { sweep_begin_ns_ = begin_ns; }
 
@@ -128,8 +131,7 @@ class FakeCamera {
     static_cast<FakeCamera*>(self)->fill(buffer);
   }
   void fill(ArvBuffer* buffer) {
-    long frame = next_frame_;
-    std::int64_t timestamp_ns = next_timestamp_ns_;
+    auto [frame, timestamp_ns] = take_next();
     if (!is_wired_) {
       const std::int64_t period_ns = std::max<std::int64_t>(1, read(device(), period_register)) * 1000;
       const bool is_triggered = read(device(), trigger_mode_register) == 1;
@@ -147,13 +149,26 @@ class FakeCamera {
     ++sent_;
   }
 
+  struct Next {
+    long frame = -1;
+    std::int64_t timestamp_ns = 0;
+  };
+  Next take_next() {
+    const std::lock_guard lock(mutex_);
+    is_busy_ = false;
+    return next_;
+  }
+
   std::string name_, address_;
   int number_;
   const FakeRigOptions& options_;
   ArvHandle<ArvGvFakeCamera> camera_;
   std::atomic<bool> is_wired_ = false, has_stalled_ = false, has_died_ = false, may_die_ = true;
-  std::atomic<long> next_frame_ = -1, sent_ = 0;
-  std::atomic<std::int64_t> next_timestamp_ns_ = 0, sweep_begin_ns_ = 0;
+  std::atomic<bool> is_busy_ = false;  ///< with a trigger that it has not yet acted on
+  std::atomic<long> sent_ = 0;
+  std::atomic<std::int64_t> sweep_begin_ns_ = 0;
+  std::mutex mutex_;  ///< guards what follows
+  Next next_;
 };
 
 class MatrixCamera : public FakeCamera {
