@@ -57,4 +57,24 @@ Eigen::Vector3d interpolate(const PageSurface& surface, const Image<Eigen::Vecto
   return sum;
 }
 
+StrainSummary summarise_strain(const PageSurface& surface) {
+  constexpr float strain_that_matters = 5e-4f, explained_sigmas = 4;
+  double nodes = 0, squares = 0, unexplained = 0;
+  for (std::size_t k = 0; k < surface.strain.size(); ++k) {
+    const float strain = surface.strain.data()[k], sigma = surface.strain_sigma.data()[k];
+    if (surface.status.data()[k] != PixelStatus::ok || !std::isfinite(strain)) continue;
+    ++nodes;
+    squares += double(strain) * strain;
+    unexplained += std::abs(strain) > std::max(strain_that_matters, explained_sigmas * sigma);
+  }
+  if (nodes == 0) return {};
+  return {std::sqrt(squares / nodes), unexplained / nodes};
+}
+
+double covered_share(const PageSurface& surface) {
+  if (surface.status.size() == 0) return 0;
+  const auto covered = std::ranges::count(surface.status.pixels(), PixelStatus::covered);
+  return static_cast<double>(covered) / static_cast<double>(surface.status.size());
+}
+
 }  // namespace pagesweep

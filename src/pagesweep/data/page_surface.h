@@ -50,4 +50,16 @@ struct PageSurface {
 /// \return [mm] rig frame
 Eigen::Vector3d interpolate(const PageSurface& surface, const Image<Eigen::Vector3f>& nodes, double s_mm, double t_mm);
 
+/// How well a flattening fits the sheet that was measured.
+struct StrainSummary {
+  double rms = 0;                ///< relative, of the measured nodes
+  double unexplained_share = 0;  ///< of them: strained by more than 0.05 % and four standard deviations. Such paper is
+                                 ///< damaged, wet or not paper, or something is wrong.
+};
+/// \return  zeros if no strain was computed
+StrainSummary summarise_strain(const PageSurface& surface);
+
+/// Share of the nodes that are covered by what is not the paper.
+double covered_share(const PageSurface& surface);
+
 }  // namespace pagesweep

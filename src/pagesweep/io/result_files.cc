@@ -78,6 +78,7 @@ CameraFiles::CameraFiles(const fs::path& folder, const std::string& camera)
 PageFiles::PageFiles(const fs::path& folder, int index)
     : scan_map(folder / fmt::format("page_{}_scanmap.tiff", index)),
       surface(folder / fmt::format("page_{}_surface.tiff", index)),
+      strain(folder / fmt::format("page_{}_strain.tiff", index)),
       stem(folder / fmt::format("page_{}", index)) {
   const auto listed = read_pages_file(folder);
   for (const PageEntry& page : listed ? listed->pages : std::vector<PageEntry>{})

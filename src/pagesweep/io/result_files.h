@@ -25,7 +25,7 @@ struct PageFiles {
   std::filesystem::path picture(std::string_view format) const;  ///< \param format  the extension, such as "png"
   /// The pictures that are there, whatever their format; a name that pages.json gives is the first.
   std::vector<std::filesystem::path> pictures() const;
-  std::filesystem::path scan_map, surface;
+  std::filesystem::path scan_map, surface, strain;
 
  private:
   std::filesystem::path stem, named;

@@ -54,6 +54,7 @@ void remove_old_pages(const fs::path& folder) {
     const PageFiles files(folder, index);
     for (const fs::path& picture : files.pictures()) fs::remove(picture);
     fs::remove(files.surface);
+    fs::remove(files.strain);
     fs::remove(files.scan_map);
   }
   fs::remove(folder / "pages.json");
@@ -101,6 +102,8 @@ void write_pages(const fs::path& folder, std::span<const Page> pages, std::span<
     const PageFiles files(folder, pages[i].index);
     write_scan_map(files.scan_map, pages[i].scan_map);
     write_surface(files.surface, surfaces[i]);
+    if (surfaces[i].strain.size() > 0)
+      write_float_tiff(files.strain, {surfaces[i].strain.view(), surfaces[i].strain_sigma.view()});
     const std::string name = names[i] + "." + std::string(extension_of(options.format));
     write_picture(folder / name, finished(pages[i], options, origin), options.picture);
     index.pages.push_back({pages[i].index, name, side_of(pages[i].index, static_cast<int>(pages.size()))});

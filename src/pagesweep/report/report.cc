@@ -111,8 +111,15 @@ Json to_json(const ReportInputs& inputs, const Verdict& verdict) {
   for (const CameraReport& camera : inputs.cameras) json["cameras"].push_back(to_json(camera));
   json["pages"] = Json::array();
   for (const Page& page : inputs.pages) json["pages"].push_back(to_json(page));
-  for (std::size_t i = 0; i < std::min(inputs.surfaces.size(), inputs.pages.size()); ++i)
-    json["pages"][i]["model"] = utf8(inputs.surfaces[i].model_name);
+  for (std::size_t i = 0; i < std::min(inputs.surfaces.size(), inputs.pages.size()); ++i) {
+    const PageSurface& surface = inputs.surfaces[i];
+    const StrainSummary strain = summarise_strain(surface);
+    Json& page = json["pages"][i];
+    page["model"] = utf8(surface.model_name);
+    page["strain_rms"] = number(strain.rms);
+    page["unexplained_strain_share"] = number(strain.unexplained_share);
+    page["covered_share"] = number(covered_share(surface));
+  }
   for (std::size_t i = 0; i < std::min(inputs.quality.size(), inputs.pages.size()); ++i)
     json["pages"][i]["quality"] = to_json(inputs.quality[i]);
   if (!inputs.profile.empty()) {

@@ -113,6 +113,20 @@ std::string format_pages(const ReportInputs& inputs, const PictureEncoder& encod
                                  : format_row("two", before + after);
 }
 
+std::string format_strain(const PageSurface& surface, const PictureEncoder& encoder) {
+  if (surface.strain.size() == 0) return "";
+  Image<float> strain = surface.strain;
+  for (float& value : strain.pixels()) value *= 1000;
+  const StrainSummary summary = summarise_strain(surface);
+  PictureFigure figure = map_figure(strain, Ramp::diverging, symmetric_range_of(strain, 0.03), "per mille", encoder);
+  figure.title = fmt::format("Page {}: strain.", surface.index);
+  figure.caption = fmt::format(
+      "Where the measured sheet is longer (red) or shorter (blue) than laid flat. Paper does not stretch: {:.2g} % of "
+      "it seems to, by more than the measurement explains.",
+      100 * summary.unexplained_share);
+  return format_figure(figure);
+}
+
 std::string format_relief(const ReportInputs& inputs, const PictureEncoder& encoder) {
   std::vector<const PointMap*> maps;
   for (const CameraReport& camera : inputs.cameras)
@@ -136,7 +150,7 @@ std::string format_relief(const ReportInputs& inputs, const PictureEncoder& enco
     figure.title = fmt::format("Page {}: what the {} model misses.", surface.index, surface.model_name);
     figure.caption =
         "Measured surface above (red) or below (blue) the model. The difference vector carries it into the page.";
-    differences += format_figure(figure);
+    differences += format_figure(figure) + format_strain(surface, encoder);
   }
   if (differences.empty()) return format_figure(relief);
   return format_row("surface", format_figure(relief) + differences);

@@ -65,6 +65,11 @@ MeshSpot GridMesh::spot_at(double s_mm, double t_mm) const {
   return {triangle(2 * cell + 1), {a + b - 1, 1 - a, 1 - b}};
 }
 
+bool GridMesh::is_missing(double s_mm, double t_mm) const {
+  if (missing.pixels().empty()) return false;
+  return missing(static_cast<int>(place_in(s, s_mm).cell), static_cast<int>(place_in(t, t_mm).cell)) != 0;
+}
+
 Eigen::Vector3d GridMesh::point(const MeshSpot& spot) const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t k = 0; k < 3; ++k) sum += double(spot.weight[k]) * positions.pixels()[spot.node[k]];

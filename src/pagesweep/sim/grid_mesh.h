@@ -25,6 +25,7 @@ struct GridMesh {
   std::vector<double> s, t;          ///< [mm] ascending
   Image<Eigen::Vector3d> positions;  ///< [mm] rig frame
   Image<Eigen::Vector3f> normals;    ///< unit length, away from the table
+  Image<std::uint8_t> missing = {};  ///< cells that are torn off; empty: none
 
   int columns() const { return positions.width(); }
   int rows() const { return positions.height(); }
@@ -33,6 +34,10 @@ struct GridMesh {
   /// The nodes of a triangle.
   std::array<std::uint32_t, 3> triangle(std::uint32_t index) const;
   int triangle_count() const { return 2 * (columns() - 1) * (rows() - 1); }
+  /// Whether a triangle is torn off.
+  bool is_missing(std::uint32_t triangle) const { return !missing.pixels().empty() && missing.pixels()[triangle / 2]; }
+  /// Whether the spot at (s, t) is.
+  bool is_missing(double s_mm, double t_mm) const;
   /// The spot at (s, t), which is clamped to the grid.
   MeshSpot spot_at(double s_mm, double t_mm) const;
   Eigen::Vector3d point(const MeshSpot& spot) const;

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double beyond_mm = 6;  ///< how far the base surface is known beyond the sheet's edges
 constexpr double relax_spacing_mm = 2;
+constexpr double crumple_refinement = 0.2;  ///< spacing of a crumpled sheet's mesh over that of others
 
 bool runs_across(SheetEdge anchor) { return anchor == SheetEdge::left || anchor == SheetEdge::right; }
 
@@ -126,6 +127,29 @@ double height_of(const std::vector<Dent>& dents, double s, double t) {
   return height;
 }
 
+/// Distances of a spot from both edges at a corner, inwards.
+Eigen::Vector2d from_corner(SheetCorner corner, double s, double t, double width_mm, double height_mm) {
+  const bool left = corner == SheetCorner::top_left || corner == SheetCorner::bottom_left;
+  const bool top = corner == SheetCorner::top_left || corner == SheetCorner::top_right;
+  return {left ? s : width_mm - s, top ? t : height_mm - t};
+}
+
+/// Where a spot would lie if its corner rolled up on a flat sheet, and how high above it.
+Eigen::Vector3d roll(const SheetShape& shape, double s, double t) {
+  Eigen::Vector3d place(s, t, 0);
+  for (const Curl& curl : shape.curls) {
+    const Eigen::Vector2d inwards = from_corner(curl.corner, s, t, shape.width_mm, shape.height_mm);
+    const double beyond = curl.length_mm - (inwards.x() + inwards.y()) / std::numbers::sqrt2;
+    if (!(beyond > 0)) continue;
+    const double angle = beyond / curl.radius_mm;
+    const double back = (beyond - curl.radius_mm * std::sin(angle)) / std::numbers::sqrt2;
+    place.x() += s < 0.5 * shape.width_mm ? back : -back;
+    place.y() += t < 0.5 * shape.height_mm ? back : -back;
+    place.z() += curl.radius_mm * (1 - std::cos(angle));
+  }
+  return place;
+}
+
 /// How far the paper slides along the base, on a grid of its own; linear in between.
 class Sliding {
  public:
@@ -184,9 +208,57 @@ Eigen::Vector3d normal_of(const Lift& surface, double s, double t) {
   return along_t.cross(along_s).normalized();
 }
 
+/// Cuts the torn corners out of the mesh, cell by cell.
+void tear(const SheetShape& shape, GridMesh& mesh) {
+  if (shape.tears.empty()) return;
+  mesh.missing = Image<std::uint8_t>(mesh.columns() - 1, mesh.rows() - 1, 0);
+  for (int j = 0; j + 1 < mesh.rows(); ++j)
+    for (int i = 0; i + 1 < mesh.columns(); ++i) {
+      const double s = 0.5 * (mesh.s[std::size_t(i)] + mesh.s[std::size_t(i) + 1]);
+      const double t = 0.5 * (mesh.t[std::size_t(j)] + mesh.t[std::size_t(j) + 1]);
+      for (const Tear& part : shape.tears)
+        if (part.takes(s, t, shape.width_mm, shape.height_mm)) mesh.missing(i, j) = 1;
+    }
+}
+
+/// Creases are sharp: the mesh cuts them off by a fraction of its spacing, which has to be small.
+Sheet crumple_sheet(const SheetShape& shape, double spacing_mm) {
+  const CrumpledSheet crumpled(shape.width_mm, shape.height_mm, shape.crumple);
+  const Eigen::AngleAxisd turn(shape.turn_rad, Eigen::Vector3d::UnitZ());
+  const Lift surface = [&](double s, double t, double) -> Eigen::Vector3d {
+    return shape.at_mm + turn * crumpled.at(s, t);
+  };
+  Sheet sheet;
+  GridMesh& mesh = sheet.mesh;
+  mesh = GridMesh(even_lines(shape.width_mm, spacing_mm), even_lines(shape.height_mm, spacing_mm));
+  parallel_rows(mesh.rows(), [&](int j) {
+    for (int i = 0; i < mesh.columns(); ++i) {
+      const double s = mesh.s[std::size_t(i)], t = mesh.t[std::size_t(j)];
+      mesh.positions(i, j) = surface(s, t, 0);
+      mesh.normals(i, j) = normal_of(surface, s, t).cast<float>();
+    }
+  });
+  sheet.largest_strain = largest_strain(mesh);
+  return sheet;
+}
+
 }  // namespace
 
+bool Tear::takes(double s_mm, double t_mm, double width_mm, double height_mm) const {
+  const Eigen::Vector2d inwards = from_corner(corner, s_mm, t_mm, width_mm, height_mm);
+  const double a = inwards.x() / along_s_mm, b = inwards.y() / along_t_mm;
+  // Rags of several lengths, along the line.
+  const double along = a - b;
+  const double rags = 0.03 * std::sin(9 * along + 1) + 0.02 * std::sin(23 * along) + 0.012 * std::sin(57 * along + 2);
+  return a + b < 1 + rags;
+}
+
 Sheet bend_sheet(const SheetShape& shape, double spacing_mm) {
+  if (shape.crumple.folds > 0) {
+    Sheet sheet = crumple_sheet(shape, crumple_refinement * spacing_mm);
+    tear(shape, sheet.mesh);
+    return sheet;
+  }
   const BaseSurface base(shape);
   const bool across = runs_across(shape.anchor);
   Sheet sheet;
@@ -195,19 +267,22 @@ Sheet bend_sheet(const SheetShape& shape, double spacing_mm) {
   GridMesh& mesh = sheet.mesh;
   std::optional<Sliding> sliding;
   if (!shape.dents.empty()) sliding.emplace(shape, base);
-  const Lift dented = [&](double s, double t, double) {
-    const Eigen::Vector2d shift = sliding->at(s, t);
-    return base.lift(s + shift.x(), t + shift.y(), height_of(shape.dents, s, t));
+  const bool is_plain = shape.dents.empty() && shape.curls.empty();
+  const Lift formed = [&](double s, double t, double) {
+    const Eigen::Vector2d shift = sliding ? sliding->at(s, t) : Eigen::Vector2d::Zero();
+    const Eigen::Vector3d rolled = roll(shape, s + shift.x(), t + shift.y());
+    return base.lift(rolled.x(), rolled.y(), rolled.z() + height_of(shape.dents, s, t));
   };
   parallel_rows(mesh.rows(), [&](int j) {
     for (int i = 0; i < mesh.columns(); ++i) {
       const double s = mesh.s[std::size_t(i)], t = mesh.t[std::size_t(j)];
       const auto [point, normal] = base.at(s, t);
-      mesh.positions(i, j) = sliding ? dented(s, t, 0) : point;
-      mesh.normals(i, j) = (sliding ? normal_of(dented, s, t) : normal).cast<float>();
+      mesh.positions(i, j) = is_plain ? point : formed(s, t, 0);
+      mesh.normals(i, j) = (is_plain ? normal : normal_of(formed, s, t)).cast<float>();
     }
   });
   sheet.largest_strain = largest_strain(mesh);
+  tear(shape, mesh);
   return sheet;
 }
 

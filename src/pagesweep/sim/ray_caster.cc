@@ -25,7 +25,8 @@ RTCGeometry make_geometry(RTCDevice device, const GridMesh& mesh) {
   auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles));
   for (std::uint32_t k = 0; k < triangles; ++k)
-    for (const std::uint32_t node : mesh.triangle(k)) *indices++ = node;
+    for (const std::uint32_t node : mesh.triangle(k))
+      *indices++ = mesh.is_missing(k) ? 0 : node;  // three times the same node: met by no ray
   rtcCommitGeometry(geometry);
   return geometry;
 }

@@ -67,6 +67,35 @@ std::vector<ProfileSlope> read_slopes(const JsonReader& json) {
   return slopes;
 }
 
+Curl read_curl(const JsonReader& json) {
+  Curl curl;
+  read(json, "corner", curl.corner);
+  curl.length_mm = json.at("length_mm").number(1, 200);
+  curl.radius_mm = json.at("radius_mm").number(10, 1000);
+  if (!(curl.length_mm < 1.2 * curl.radius_mm))
+    throw json.at("length_mm").error("expected less than 1.2 radii: the corner would hide itself");
+  return curl;
+}
+
+Tear read_tear(const JsonReader& json) {
+  Tear tear;
+  read(json, "corner", tear.corner);
+  const auto along = read_list(json.at("along_mm"), 2);
+  if (!(std::min(along[0], along[1]) >= 2)) throw json.at("along_mm").error("expected at least 2 mm along both edges");
+  tear.along_s_mm = along[0], tear.along_t_mm = along[1];
+  return tear;
+}
+
+Crumple read_crumple(const JsonReader& json) {
+  Crumple crumple;
+  crumple.folds = json.at("folds").integer(1, 200);
+  read_angle(json, "steepest_deg", crumple.steepest_rad, 60);
+  if (!(crumple.steepest_rad > 0)) throw json.at("steepest_deg").error("expected an angle above 0");
+  read(json, "roughness_mm", crumple.roughness_mm, 0.1, 30);
+  read(json, "seed", crumple.seed, 0, 1 << 30);
+  return crumple;
+}
+
 SheetShape read_shape(const JsonReader& json, double width_mm, double height_mm) {
   SheetShape shape;
   shape.width_mm = width_mm;
@@ -80,7 +109,18 @@ SheetShape read_shape(const JsonReader& json, double width_mm, double height_mm)
     if (!(std::abs(shape.apex_mm) >= nearest && std::abs(shape.apex_mm) <= 1e6))
       throw apex->error(fmt::format("expected a distance between {} and 1e6 on either side", nearest));
   }
-  shape.slopes = read_slopes(json.at("slopes_deg"));
+  if (const auto crumple = json.find("crumple")) {
+    shape.crumple = read_crumple(*crumple);
+    for (const char* field : {"anchor", "apex_mm", "slopes_deg", "dents", "curls"})
+      if (json.find(field)) throw json.at(field).error("not for a sheet that is crumpled");
+    shape.slopes = {{0, 0}};
+  } else {
+    shape.slopes = read_slopes(json.at("slopes_deg"));
+  }
+  if (const auto curls = json.find("curls"))
+    for (const JsonReader& curl : curls->items()) shape.curls.push_back(read_curl(curl));
+  if (const auto tears = json.find("tears"))
+    for (const JsonReader& tear : tears->items()) shape.tears.push_back(read_tear(tear));
   if (const auto dents = json.find("dents"))
     for (const JsonReader& dent : dents->items()) shape.dents.push_back(read_dent(dent));
   return shape;
@@ -147,6 +187,28 @@ SceneSphere read_sphere(const JsonReader& json) {
   read(json, "albedo", sphere.albedo, 0, 1);
   sphere.gloss = read_gloss(json.find("gloss"));
   return sphere;
+}
+
+Obstacle read_obstacle(const JsonReader& json, int pages) {
+  Obstacle obstacle;
+  read(json, "kind", obstacle.kind);
+  const bool is_slip = obstacle.kind == ObstacleKind::slip;
+  if (is_slip) obstacle.albedo = 0.8;
+  read(json, "page", obstacle.page, 1, pages);
+  const auto at = read_list(json.at("at_mm"), 2);
+  obstacle.s_mm = at[0], obstacle.t_mm = at[1];
+  read_angle(json, "turn_deg", obstacle.turn_rad, 360);
+  read(json, "length_mm", obstacle.length_mm, 5, 300);
+  read(json, "breadth_mm", obstacle.breadth_mm, 4, 300);
+  read(json, "lift_mm", obstacle.lift_mm, 0.05, 30);
+  read(json, "albedo", obstacle.albedo, 0, 1);
+  return obstacle;
+}
+
+BlindArea read_blind_area(const JsonReader& json) {
+  const auto list = read_list(json, 4);
+  if (!(list[0] < list[2] && list[1] < list[3])) throw json.error("expected [low x, low y, high x, high y]");
+  return {list[0], list[1], list[2], list[3]};
 }
 
 enum class SweepModel { translating_plane, rotating_plane };
@@ -228,6 +290,8 @@ void read_cameras(const JsonReader& json, Scene& scene) {
   read(json, "paper_level", paper_level, 0.001, 100);
   scene.camera.exposure = paper_level / PrintDesign{}.paper_albedo;
   if (const auto exposures = json.find("exposures")) scene.camera.exposures = read_exposures(*exposures);
+  if (const auto areas = json.find("blind_mm"))
+    for (const JsonReader& area : areas->items()) scene.blind_areas.push_back(read_blind_area(area));
   const auto views = json.find("views");
   if (!views) return;
   const auto items = views->items();
@@ -350,6 +414,9 @@ Scene read_scene(const std::filesystem::path& file) {
     for (const JsonReader& page : pages->items()) scene.pages.push_back(read_page(page));
   if (const auto spheres = json.find("spheres"))
     for (const JsonReader& sphere : spheres->items()) scene.spheres.push_back(read_sphere(sphere));
+  if (const auto obstacles = json.find("obstacles"))
+    for (const JsonReader& obstacle : obstacles->items())
+      scene.obstacles.push_back(read_obstacle(obstacle, static_cast<int>(scene.pages.size())));
   if (scene.pages.empty() && scene.spheres.empty())
     throw json.error("expected pages or spheres: there is nothing to scan");
   if (const auto table = json.find("table")) read(*table, "albedo", scene.table_albedo, 0, 1);

@@ -157,6 +157,7 @@ ScanMap find_scan_map(const World& world, const RayCaster& caster, int surface, 
   parallel_rows(height, [&](int j) {
     for (int i = 0; i < width; ++i) {
       const double s = (i + 0.5) / pixels_per_mm, t = (j + 0.5) / pixels_per_mm;
+      if (mesh.is_missing(s, t)) continue;
       const Eigen::Vector3d point = mesh.point(mesh.spot_at(s, t));
       const auto pixel = scanner.project(point);
       if (!pixel || !scanner.sees(*pixel)) continue;

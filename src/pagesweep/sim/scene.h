@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pagesweep/camera/rig.h"
+#include "pagesweep/sim/obstacle.h"
 #include "pagesweep/sim/paper.h"
 #include "pagesweep/sim/print.h"
 #include "pagesweep/sim/render_scan.h"
@@ -27,6 +28,16 @@ struct SceneSphere {
   double radius_mm = 20;
   double albedo = 0.85;
   Gloss gloss;
+};
+
+/// A rectangle on the table. What lies above it no camera sees, as if a thing stood in front of their lenses: it is
+/// dark in all frames. The scanner does see it.
+struct BlindArea {
+  double low_x_mm = 0, low_y_mm = 0, high_x_mm = 0, high_y_mm = 0;
+  bool contains(const Eigen::Vector3f& point) const {
+    return double(point.x()) >= low_x_mm && double(point.x()) <= high_x_mm && double(point.y()) >= low_y_mm &&
+           double(point.y()) <= high_y_mm;
+  }
 };
 
 struct SceneLamp {
@@ -52,6 +63,8 @@ struct Scene {
   std::string about;
   std::vector<ScenePage> pages;  ///< from left to right
   std::vector<SceneSphere> spheres;
+  std::vector<Obstacle> obstacles;
+  std::vector<BlindArea> blind_areas;
   double table_albedo = 0.04;
   Rig rig;  ///< cameras and scanner; its light is lamp.light
   SceneLamp lamp;

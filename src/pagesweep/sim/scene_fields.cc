@@ -23,7 +23,10 @@ const char* const known_fields = R"({
     "width_mm": 0, "height_mm": 0, "on_block": 0,
     "shape": {
       "anchor": 0, "at_mm": 0, "turn_deg": 0, "apex_mm": 0, "slopes_deg": 0,
-      "dents": {"at_mm": 0, "height_mm": 0, "radius_mm": 0, "turn_deg": 0}
+      "dents": {"at_mm": 0, "height_mm": 0, "radius_mm": 0, "turn_deg": 0},
+      "curls": {"corner": 0, "length_mm": 0, "radius_mm": 0},
+      "tears": {"corner": 0, "along_mm": 0},
+      "crumple": {"folds": 0, "steepest_deg": 0, "roughness_mm": 0, "seed": 0}
     },
     "print": {
       "texts": 0, "font_size_pt": 0, "line_spacing": 0, "margins_mm": 0, "columns": 0, "footer": 0,
@@ -32,13 +35,16 @@ const char* const known_fields = R"({
     "gloss": {"strength": 0, "exponent": 0}
   },
   "spheres": {"center_mm": 0, "radius_mm": 0, "albedo": 0, "gloss": {"strength": 0, "exponent": 0}},
+  "obstacles": {
+    "kind": 0, "page": 0, "at_mm": 0, "turn_deg": 0, "length_mm": 0, "breadth_mm": 0, "lift_mm": 0, "albedo": 0
+  },
   "table": {"albedo": 0},
   "lamp": {
     "model": 0, "first_mm": 0, "mm_per_frame": 0, "lean_deg": 0, "skew_deg": 0, "bar_height_mm": 0,
     "bar_length_mm": 0, "bar_y_mm": 0, "shape": 0, "fwhm_mm": 0, "softness": 0
   },
   "cameras": {
-    "frames": 0, "rays_per_side": 0, "psf_sigma_px": 0, "ambient": 0, "paper_level": 0, "exposures": 0,
+    "frames": 0, "rays_per_side": 0, "psf_sigma_px": 0, "ambient": 0, "paper_level": 0, "exposures": 0, "blind_mm": 0,
     "views": {
       "size_px": 0, "focal_px": 0, "principal_px": 0, "distortion": 0, "center_mm": 0, "target_mm": 0, "roll_deg": 0
     }

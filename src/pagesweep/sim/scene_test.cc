@@ -99,7 +99,7 @@ TEST_F(SceneTest, PutsEveryScannerAboveTheTable) {
 /// The scenes of the project: everything is within view of both cameras, of the scanner, and of the whole sweep.
 TEST(Scenes, ShowTheirPagesToEveryInstrument) {
   for (const char* name : {"spread", "dent", "overexposed", "flat", "artefact", "artefact_across", "artefact_inclined",
-                           "artefact_high", "folded", "exposure"}) {
+                           "artefact_high", "folded", "exposure", "crumpled", "finger", "slip", "torn", "missing"}) {
     const Scene scene = read_scene(fs::path(PAGESWEEP_SCENES) / (std::string(name) + ".json"));
     const double margin_frames = 1.5 * scene.lamp.fwhm_mm / 1.7;
     for (const ScenePage& page : scene.pages) {

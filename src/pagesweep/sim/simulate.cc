@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "pagesweep/base/parallel.h"
 
@@ -49,6 +51,12 @@ Stage build_stage(const Scene& scene, Progress& progress) {
   stage.world.surfaces.push_back({.mesh = make_rectangle({-340, -280, 0}, 680, 560, 3 * scene.quality.mesh_mm),
                                   .albedo = Texture(static_cast<float>(scene.table_albedo))});
   for (const ScenePage& page : scene.pages) add_page(page, scene.quality, stage, progress);
+  for (const Obstacle& obstacle : scene.obstacles) {
+    const auto below = std::size_t(stage.page_surfaces[std::size_t(obstacle.page - 1)]);
+    stage.world.surfaces.push_back(
+        {.mesh = make_obstacle(obstacle, stage.world.surfaces[below].mesh, scene.quality.mesh_mm),
+         .albedo = Texture(static_cast<float>(obstacle.albedo))});
+  }
   for (const SceneSphere& sphere : scene.spheres)
     stage.world.surfaces.push_back(
         {.mesh = make_sphere(sphere.center_mm, sphere.radius_mm, 0.3 * scene.quality.mesh_mm),
@@ -64,9 +72,26 @@ Image<Eigen::Vector3f> find_page_points(const GridMesh& mesh, const SimulatedPag
   for (int j = 0; j < points.height(); ++j)
     for (int i = 0; i < points.width(); ++i) {
       const double s = (i * subsampling + 0.5) / page.pixels_per_mm, t = (j * subsampling + 0.5) / page.pixels_per_mm;
+      if (mesh.is_missing(s, t)) {
+        points(i, j).setConstant(not_a_number);
+        continue;
+      }
       points(i, j) = mesh.point(mesh.spot_at(s, t)).cast<float>();
     }
   return points;
+}
+
+/// The spots that the scan does not show.
+Image<std::uint8_t> find_fates(const GridMesh& mesh, const SimulatedPage& page) {
+  Image<std::uint8_t> fates(page.albedo.width(), page.albedo.height(), std::uint8_t(SpotFate::seen));
+  parallel_rows(fates.height(), [&](int j) {
+    for (int i = 0; i < fates.width(); ++i)
+      if (mesh.is_missing((i + 0.5) / page.pixels_per_mm, (j + 0.5) / page.pixels_per_mm))
+        fates(i, j) = std::uint8_t(SpotFate::torn);
+      else if (std::isnan(page.scan_map.u(i, j)))
+        fates(i, j) = std::uint8_t(SpotFate::covered);
+  });
+  return fates;
 }
 
 /// Where every spot of the pages went.
@@ -82,6 +107,27 @@ void note_page_truth(Stage& stage, const RayCaster& caster, Simulation& result, 
     if (scene.rig.scanner)
       page.scan_map = find_scan_map(stage.world, caster, surface, *scene.rig.scanner, page.albedo.width(),
                                     page.albedo.height(), page.pixels_per_mm);
+    const bool is_whole = mesh.missing.pixels().empty() && scene.obstacles.empty();
+    if (scene.rig.scanner && !is_whole) page.fates = find_fates(mesh, page);
+  }
+}
+
+/// Takes the light from what the cameras do not see.
+void darken_blind_areas(const Scene& scene, const Image<Eigen::Vector3f>& points, Frames& frames) {
+  if (scene.blind_areas.empty()) return;
+  const auto is_blind = [&](const Eigen::Vector3f& point) {
+    return std::ranges::any_of(scene.blind_areas, [&](const BlindArea& area) { return area.contains(point); });
+  };
+  for (int k = 0; k < frames.count(); ++k) {
+    GrayImage frame = frames.frame(k);
+    std::visit(
+        [&](auto& samples) {
+          using Sample = std::remove_reference_t<decltype(samples(0, 0))>;
+          for (std::size_t i = 0; i < samples.size(); ++i)
+            if (is_blind(points.data()[i])) samples.data()[i] = static_cast<Sample>(scene.sensor.black_level);
+        },
+        frame);
+    frames.set(k, std::move(frame));
   }
 }
 
@@ -120,6 +166,7 @@ Simulation simulate(const Scene& full_scene, const SimulateOptions& options, Pro
     result.frames.push_back(
         render_camera(lit, camera, static_cast<int>(k), scene.camera, scene.sensor, seed, progress));
     result.camera_points.push_back(find_camera_points(world, caster, camera));
+    darken_blind_areas(scene, result.camera_points.back(), result.frames.back());
   }
   if (scene.rig.scanner) {
     result.scan = render_scan(lit, lamp, *scene.rig.scanner, scene.scan, seed, progress);

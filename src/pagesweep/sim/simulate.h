@@ -27,6 +27,9 @@ struct SimulateOptions {
   }
 };
 
+/// What became of a spot of a page, in the scan.
+enum class SpotFate : std::uint8_t { seen = 0, covered = 1, torn = 2 };
+
 /// What is printed on a page and where every spot of it went.
 struct SimulatedPage {
   Image<float> albedo;  ///< flat, as printed
@@ -34,7 +37,8 @@ struct SimulatedPage {
   std::string text = {};               ///< empty: none
   ScanMap scan_map = {};               ///< of each pixel
   Image<Eigen::Vector3f> points = {};  ///< [mm] rig frame, of each points_subsampling-th pixel
-  double largest_strain = 0;           ///< of the bent paper, relative
+  Image<std::uint8_t> fates = {};  ///< a SpotFate a pixel; empty if nothing lies on the page and nothing is torn off
+  double largest_strain = 0;       ///< of the bent paper, relative
 };
 
 /// A capture with its truth, in memory.

@@ -103,6 +103,8 @@ void write_truth_files(const Simulation& simulation, const fs::path& folder, Pro
     write_picture(truth.page_path(index), flat_picture(page));
     if (simulation.rig.scanner) write_scan_map(truth.page_scan_map_path(index), page.scan_map);
     write_vector_tiff(truth.page_points_path(index), page.points);
+    if (!page.fates.pixels().empty())
+      write_gray_png(folder / fmt::format("page_{}_fates.png", index), page.fates.view());
     if (!text.empty()) write_bytes(folder / text, page.text + "\n");
     progress.advance(double(index) / double(simulation.pages.size()));
   }

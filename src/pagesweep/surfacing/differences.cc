@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/surfacing/creased_sheet.h"
 #include "pagesweep/surfacing/flatten.h"
 
 namespace pagesweep {
@@ -12,6 +14,7 @@ namespace {
 
 constexpr double ease_mm = 15;
 constexpr double model_noise_mm = 0.02;
+constexpr double least_cover_mm = 0.3;
 
 Support support_of(const HeightField& field, const CellMean& cell, int i, int j) {
   Support place;
@@ -68,10 +71,94 @@ void ease_out(Image<double>& dz, const Image<std::uint8_t>& known, double cell_m
     }
 }
 
+/// What was measured well above the sheet is not the sheet.
+void find_cover(const RuledSurface& model, Differences& differences) {
+  const HeightField& field = *differences.field;
+  parallel_rows(field.rows(), [&](int j) {
+    for (int i = 0; i < field.columns(); ++i) {
+      if (differences.known(i, j) || !std::isfinite(field.z(i, j))) continue;
+      const double sheet =
+          model.height({field.p_of(i), field.q_of(j)}) + differences.dz(differences.finer * i, differences.finer * j);
+      if (!(field.z(i, j) - sheet > least_cover_mm)) continue;
+      differences.status(i, j) = PixelStatus::covered;
+      differences.cover_mm(i, j) = static_cast<float>(field.z(i, j) - sheet);
+    }
+  });
+}
+
+/// By how much cells scatter more than their points' sigma promises, from windows so small that creases hardly count.
+double noise_factor_of(const Image<CellMean>& cells, double cell_mm) {
+  constexpr int pitch = 5;
+  constexpr double radius_cells = 2.5;
+  const double no_edges = std::numeric_limits<double>::infinity();
+  std::vector<double> scatters;
+  for (const LocalFit& fit : fit_lattice(cells, cell_mm, pitch, {radius_cells * cell_mm, 2, no_edges}).pixels())
+    if (fit.ok) scatters.push_back(fit.scatter);
+  if (scatters.empty()) return 1;
+  // The lower quartile: most windows of a crumpled sheet hold a crease. Where none does, scatters of so few cells have
+  // it at 0.87 of their median.
+  const auto lower = scatters.begin() + static_cast<std::ptrdiff_t>(scatters.size() / 4);
+  std::ranges::nth_element(scatters, lower);
+  return std::max(0.1, *lower / 0.87);
+}
+
+/// The page's points in smaller cells, so that a crease has a place within a cell.
+struct FineCells {
+  static constexpr int finer = 2;
+
+  FineCells(const Differences& differences, const RuledSurface& model) {
+    const HeightField& field = *differences.field;
+    const int columns = finer * (field.columns() - 1) + 1, rows = finer * (field.rows() - 1) + 1;
+    gaps = Image<CellMean>(columns, rows);
+    base = start = Image<double>(columns, rows, 0);
+    within = Image<std::uint8_t>(columns, rows, 0);
+    parallel_rows(rows, [&](int j) {
+      for (int i = 0; i < columns; ++i) {
+        const double u = double(i) / finer, v = double(j) / finer;
+        start(i, j) = interpolate_nodes(differences.dz, u, v);
+        within(i, j) = differences.known(static_cast<int>(std::lround(u)), static_cast<int>(std::lround(v)));
+        if (within(i, j)) base(i, j) = model.height({field.p_of(u), field.q_of(v)});
+      }
+    });
+    std::vector<std::vector<PlanPoint>> members(gaps.size());
+    for (int j = 0; j < field.rows(); ++j)
+      for (int i = 0; i < field.columns(); ++i)
+        if (differences.gaps(i, j).weight > 0) sort_points(differences.gaps(i, j), i, j, field, members);
+    parallel_rows(rows, [&](int j) {
+      for (int i = 0; i < columns; ++i) {
+        const auto& points =
+            members[static_cast<std::size_t>(j) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(i)];
+        if (points.empty()) continue;
+        CellMean& cell = gaps(i, j) = mean_of(points, field.p_of(double(i) / finer), field.q_of(double(j) / finer));
+        cell.z -= static_cast<float>(model.height(
+            {field.p_of(double(i) / finer) + double(cell.p), field.q_of(double(j) / finer) + double(cell.q)}));
+      }
+    });
+  }
+
+  Image<CellMean> gaps;
+  Image<double> base, start;
+  Image<std::uint8_t> within;
+
+ private:
+  /// A cell on the gutter holds points of the other page as well: there its own mean has to do.
+  void sort_points(const CellMean& cell, int i, int j, const HeightField& field,
+                   std::vector<std::vector<PlanPoint>>& members) const {
+    if (cell.count != field.cells(i, j).count) return;
+    for (const PlanPoint& point : field.surface_points(i, j)) {
+      const int a = static_cast<int>(std::lround(finer * field.i_of(point.p)));
+      const int b = static_cast<int>(std::lround(finer * field.j_of(point.q)));
+      if (gaps.contains(a, b))
+        members[static_cast<std::size_t>(b) * static_cast<std::size_t>(gaps.width()) + static_cast<std::size_t>(a)]
+            .push_back(point);
+    }
+  }
+};
+
 }  // namespace
 
 double Differences::at(double p_mm, double q_mm) const {
-  const double i = field->i_of(p_mm), j = field->j_of(q_mm);
+  const double i = finer * field->i_of(p_mm), j = finer * field->j_of(q_mm);
   if (!(i >= 0 && j >= 0 && i <= dz.width() - 1 && j <= dz.height() - 1)) return 0;
   return interpolate_nodes(dz, i, j);
 }
@@ -86,17 +173,22 @@ std::vector<Support> places_of(const HeightField& field, const Image<CellMean>& 
 
 Differences measure_differences(const HeightField& field, const Image<CellMean>& cells, const RuledSurface& model,
                                 double radius_mm) {
-  Image<CellMean> gaps = cells;
+  Differences differences{&field,
+                          1,
+                          cells,
+                          Image<std::uint8_t>(field.columns(), field.rows(), 0),
+                          Image<double>(field.columns(), field.rows(), 0),
+                          Image<float>(field.columns(), field.rows(), not_a_number),
+                          field.status,
+                          Image<float>(field.columns(), field.rows(), not_a_number)};
+  Image<CellMean>& gaps = differences.gaps;
   for (int j = 0; j < field.rows(); ++j)
     for (int i = 0; i < field.columns(); ++i) {
       if (!(cells(i, j).weight > 0)) continue;
       const Support place = support_of(field, cells(i, j), i, j);
       gaps(i, j).z = static_cast<float>(place.z - height_over(model, place));
     }
-  Differences differences{&field, Image<double>(field.columns(), field.rows(), 0),
-                          Image<float>(field.columns(), field.rows(), not_a_number), field.status};
   const Image<std::uint8_t> wide = widen(cells);
-  Image<std::uint8_t> known(field.columns(), field.rows(), 0);
   const LocalFitOptions options{std::max(radius_mm, 2.5 * field.cell_mm), 2, 2.5 * std::max(1.0, field.noise_factor)};
   const Image<LocalFit> fits = fit_cells(gaps, field.cell_mm, options, wide);
   parallel_rows(field.rows(), [&](int j) {
@@ -109,11 +201,25 @@ Differences measure_differences(const HeightField& field, const Image<CellMean>&
       differences.dz(i, j) = fit.z;
       differences.sigma(i, j) = static_cast<float>(fit.sigma * std::max(field.noise_factor, fit.scatter));
       status = PixelStatus::ok;
-      known(i, j) = 1;
+      differences.known(i, j) = 1;
     }
   });
-  ease_out(differences.dz, known, field.cell_mm);
+  ease_out(differences.dz, differences.known, field.cell_mm);
+  find_cover(model, differences);
   return differences;
+}
+
+Differences crease_differences(const Differences& differences, const RuledSurface& model, double radius_mm) {
+  const HeightField& field = *differences.field;
+  const FineCells fine(differences, model);
+  Differences creased = differences;
+  creased.finer = FineCells::finer;
+  const double smoothing_mm = std::max(radius_mm, 2.5 * field.cell_mm) / 6;
+  creased.dz = fit_creased_sheet(fine.gaps, fine.base, field.cell_mm / FineCells::finer,
+                                 noise_factor_of(differences.gaps, field.cell_mm), fine.within, fine.start,
+                                 {.smoothing_mm = smoothing_mm});
+  find_cover(model, creased);
+  return creased;
 }
 
 Eigen::Vector3d measured_above(const RuledSurface& model, const Differences& differences, const Eigen::Vector3d& point,

@@ -11,9 +11,14 @@ namespace pagesweep {
 /// How far the measured surface lies above a model, smoothed: dz(p, q) [mm] on the grid of a height field.
 struct Differences {
   const HeightField* field = nullptr;  ///< the grid; must outlive this
-  Image<double> dz;                    ///< [mm] everywhere; away from measurements it eases to 0 within some 15 mm
-  Image<float> sigma;                  ///< [mm] its standard deviation; NaN where it is not measured
-  Image<PixelStatus> status;           ///< whether it is measured, else why not
+  int finer = 1;                       ///< nodes of dz a cell, along either axis
+  Image<CellMean> gaps;                ///< the page's cells, their z against the model
+  Image<std::uint8_t> known;           ///< cells whose height is measured
+  Image<double> dz;  ///< [mm] everywhere, node (finer i, finer j) in the middle of cell (i, j); away from measurements
+                     ///< it eases to 0 within some 15 mm
+  Image<float> sigma;         ///< [mm] its standard deviation; NaN where it is not measured
+  Image<PixelStatus> status;  ///< whether it is measured, else why not
+  Image<float> cover_mm;      ///< height of what stands above the sheet; NaN where nothing does
 
   double at(double p_mm, double q_mm) const;
 };
@@ -26,6 +31,9 @@ std::vector<Support> places_of(const HeightField& field, const Image<CellMean>& 
 /// bend, the neighbourhood need not follow; dents remain, and the other page stays out of it.
 Differences measure_differences(const HeightField& field, const Image<CellMean>& cells, const RuledSurface& model,
                                 double radius_mm);
+
+/// The same differences with sharp creases: the sheet that fit_creased_sheet() lays through the cells.
+Differences crease_differences(const Differences& differences, const RuledSurface& model, double radius_mm);
 
 /// The measured point orthogonally above a point of the model.
 /// \param point, normal  plan coordinates; the normal is of unit length and points up

@@ -12,6 +12,7 @@ namespace {
 constexpr double print_mm = 5;          // half of the largest dark stroke that paper closes around
 constexpr double clear_contrast = 0.6;  // table: brightness below this share of the paper's
 constexpr double step_mm = 1;           // height step between neighbours that ends a surface
+constexpr double cover_step_mm = 0.4;   // the same where a surface lies on paper
 constexpr double steepest = 2.2;        // dz / d(p, q) beyond which a surface ends (65 degrees)
 constexpr double edge_drop_mm = 1.5;    // table lies lower than the paper's edge by more
 constexpr double table_depth_mm = 5, table_flatness_mm = 0.7;
@@ -76,8 +77,9 @@ struct Piece {
 
 class Pieces {
  public:
-  Pieces(const HeightField& field, const Image<std::uint8_t>& measured, const Image<std::uint8_t>& bright)
-      : field_(field), measured_(measured), bright_(bright), label_(field.columns(), field.rows(), -1) {
+  Pieces(const HeightField& field, const Image<std::uint8_t>& measured, const Image<std::uint8_t>& bright,
+         double step = step_mm)
+      : field_(field), measured_(measured), bright_(bright), step_mm_(step), label_(field.columns(), field.rows(), -1) {
     for (int j = 0; j < field.rows(); ++j)
       for (int i = 0; i < field.columns(); ++i)
         if (label_(i, j) < 0 && is_inner(i, j)) grow(i, j);
@@ -96,6 +98,20 @@ class Pieces {
     return with_edges(paper);
   }
 
+  /// Cells of the small pieces that lie on the large ones: they are higher all around.
+  Image<std::uint8_t> choose_cover() {
+    std::size_t largest = 0;
+    for (const Piece& piece : pieces_) largest = std::max(largest, piece.cells.size());
+    for (Piece& piece : pieces_) piece.paper = piece.cells.size() * 10 >= largest;
+    Image<std::uint8_t> cover(field_.columns(), field_.rows(), 0);
+    for (Piece& piece : pieces_) {
+      if (piece.paper) continue;
+      if (step_up_to(piece) > cover_step_mm)
+        for (const int k : piece.cells) cover.data()[k] = 1;
+    }
+    return cover;
+  }
+
  private:
   static constexpr std::array<std::pair<int, int>, 4> neighbours{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
 
@@ -108,14 +124,14 @@ class Pieces {
     const double here = std::clamp<double>(slopes(i, j), -steepest, steepest);
     const double there = std::clamp<double>(slopes(i2, j2), -steepest, steepest);
     return std::ranges::any_of(std::array{here, 0.5 * (here + there), there},
-                               [&](double slope) { return std::abs(rise - slope * distance_mm) < step_mm; });
+                               [&](double slope) { return std::abs(rise - slope * distance_mm) < step_mm_; });
   }
 
   /// Whether the fitted height is that of the cell's own points; the corner of an edge may be fitted as a ramp.
   bool is_fitted_well(int i, int j) const {
     const CellMean& cell = field_.cells(i, j);
     const double height = field_.z(i, j) + field_.slope_p(i, j) * cell.p + field_.slope_q(i, j) * cell.q;
-    return cell.count == 0 || std::abs(cell.z - height) < 0.5 * step_mm;
+    return cell.count == 0 || std::abs(cell.z - height) < 0.5 * step_mm_;
   }
 
   /// Whether the surface goes on to all sides that are measured. Pieces grow through such cells only: a few cells of
@@ -206,6 +222,30 @@ class Pieces {
     piece.drop_mm = drops[drops.size() / 2];
   }
 
+  /// By how much a piece is higher than the paper around it beyond what the slopes on either side explain: the median
+  /// over its rim [mm]; 0 if it has none.
+  double step_up_to(const Piece& piece) const {
+    constexpr int reach = 3;  // a cell on the edge itself sees both sides
+    std::vector<double> steps;
+    for (const int k : piece.cells) {
+      const int i = k % field_.columns(), j = k / field_.columns();
+      for (const auto& [di, dj] : neighbours) {
+        const int i2 = i + reach * di, j2 = j + reach * dj;
+        if (!label_.contains(i2, j2) || label_(i2, j2) < 0 || label_(i2, j2) == label_(i, j)) continue;
+        if (!pieces_[static_cast<std::size_t>(label_(i2, j2))].paper) continue;
+        const Image<float>& slopes = di == 0 ? field_.slope_q : field_.slope_p;
+        const double distance_mm = reach * (di + dj) * field_.cell_mm;
+        const double by_here = slopes(i, j) * distance_mm, by_there = slopes(i2, j2) * distance_mm;
+        const double rise = field_.z(i2, j2) - field_.z(i, j);
+        steps.push_back(std::clamp(rise, std::min(by_here, by_there), std::max(by_here, by_there)) - rise);
+      }
+    }
+    if (steps.empty()) return 0;
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::ranges::nth_element(steps, middle);
+    return *middle;
+  }
+
   bool is_printed(const Piece& piece) const {
     if (piece.borders == 0) return false;
     if (piece.rim_outside < 0.02) return true;
@@ -243,6 +283,7 @@ class Pieces {
   const HeightField& field_;
   const Image<std::uint8_t>& measured_;
   const Image<std::uint8_t>& bright_;
+  double step_mm_;
   Image<int> label_;
   std::vector<Piece> pieces_;
 };
@@ -257,6 +298,19 @@ void trim_mixed_cells(Image<std::uint8_t>& paper, const Image<std::uint8_t>& mea
           if (before.contains(i + di, j + dj) && measured(i + di, j + dj) && !before(i + di, j + dj)) paper(i, j) = 0;
 }
 
+/// Takes away what lies on the paper, and two cells around it, which may hold points of both.
+void take_cover_away(const HeightField& field, Image<std::uint8_t>& paper) {
+  constexpr int reach = 2;
+  const Image<std::uint8_t> whole = paper;
+  const Image<std::uint8_t> cover = Pieces(field, whole, whole, cover_step_mm).choose_cover();
+  for (int j = 0; j < paper.height(); ++j)
+    for (int i = 0; i < paper.width(); ++i)
+      if (cover(i, j))
+        for (int dj = -reach; dj <= reach; ++dj)
+          for (int di = -reach; di <= reach; ++di)
+            if (paper.contains(i + di, j + dj)) paper(i + di, j + dj) = 0;
+}
+
 }  // namespace
 
 Image<std::uint8_t> find_paper(const HeightField& field, bool small_sheets) {
@@ -268,6 +322,7 @@ Image<std::uint8_t> find_paper(const HeightField& field, bool small_sheets) {
   for (std::size_t k = 0; k < bright.size(); ++k) bright.data()[k] = !(ground.data()[k] < threshold);
   Image<std::uint8_t> paper = Pieces(field, measured, bright).choose_paper(small_sheets ? 100 : 10);
   trim_mixed_cells(paper, measured);
+  take_cover_away(field, paper);
   return paper;
 }
 

@@ -24,6 +24,8 @@ constexpr double many_outliers = 0.25;
 constexpr double nearest_to_gutter_mm = 0.2;
 constexpr double mixed_cells = 1;       // beside the gutter: as far as the spot of a pixel reaches
 constexpr double least_lift_mm = 0.01;  // of points there, by which they are known to lie between the pages
+constexpr double strain_that_matters = 5e-4;  // over 100 mm of paper 0.05 mm
+constexpr double share_that_matters = 0.05;
 
 void check(std::span<const PointMap> cameras, const SurfaceOptions& options) {
   if (cameras.empty()) throw std::invalid_argument("fit_surface: at least one camera's points are needed");
@@ -174,13 +176,28 @@ std::optional<RulingFrame> choose_gutter(const HeightField& field, const Image<s
   return RulingFrame{sum / std::max(1.0, n), 0, 0};
 }
 
+PageSurface sample(const FlatPage& flat, const HeightField& field, SurfaceModel model) {
+  PageSurface page = flat.sample(field.frame);
+  page.model_name = name_of(model);
+  return page;
+}
+
+/// Whether the sheet as measured is longer or shorter than the model's flattening in more places than dents of the
+/// paper and the rims of the measurement account for.
+bool is_no_cylinder(const FlatPage& by_model) {
+  return by_model.strain().share_beyond(strain_that_matters) > share_that_matters;
+}
+
 PageSurface finish_page(const FittedPage& fitted, const HeightField& field, const SurfaceOptions& options) {
   const Differences differences = measure_differences(field, fitted.cells, fitted.model, options.neighbourhood_mm);
-  FlatPage flat(fitted.model, differences, fitted.places, fitted.gutter);
-  if (options.model == SurfaceModel::developable) flat.follow_measurement();
-  PageSurface page = flat.sample(field.frame);
-  page.model_name = name_of(options.model);
-  return page;
+  const FlatPage by_model(fitted.model, differences, fitted.places, fitted.gutter);
+  const bool follow = options.model == SurfaceModel::developable ||
+                      (options.model == SurfaceModel::automatic && is_no_cylinder(by_model));
+  if (!follow) return sample(by_model, field, SurfaceModel::cylinder);
+  const Differences creased = crease_differences(differences, fitted.model, options.neighbourhood_mm);
+  FlatPage flat(fitted.model, creased, fitted.places, fitted.gutter);
+  flat.follow_measurement();
+  return sample(flat, field, SurfaceModel::developable);
 }
 
 }  // namespace

@@ -13,10 +13,11 @@
 namespace pagesweep {
 
 enum class SurfaceModel {
+  automatic,    ///< cylinder, unless the measured sheet differs from it by more than noise explains
   cylinder,     ///< straight rulings along the spine, a cut profile that may change from edge to edge
-  developable,  ///< the measured surface itself, laid flat with the least stretching
+  developable,  ///< the measured surface itself with its creases, laid flat with the least stretching
 };
-constexpr auto names_of(SurfaceModel) { return std::array<std::string_view, 2>{"cylinder", "developable"}; }
+constexpr auto names_of(SurfaceModel) { return std::array<std::string_view, 3>{"auto", "cylinder", "developable"}; }
 
 enum class Layout {
   automatic,  ///< a spread if there is a gutter, else a single page
@@ -27,7 +28,7 @@ enum class Layout {
 constexpr auto names_of(Layout) { return std::array<std::string_view, 4>{"automatic", "single", "spread", "items"}; }
 
 struct SurfaceOptions {
-  SurfaceModel model = SurfaceModel::cylinder;
+  SurfaceModel model = SurfaceModel::automatic;
   Layout layout = Layout::automatic;
   double smoothing = 1;
   double neighbourhood_mm = 6;
@@ -35,8 +36,9 @@ struct SurfaceOptions {
 
   template <class Visitor>
   void describe(Visitor&& visit) {
-    visit("surface-model", model, "",
-          "cylinder: straight lines along the spine; developable: the measured surface itself");
+    visit("surface", model, "",
+          "cylinder: straight lines along the spine; developable: the measured surface itself with its creases; auto: "
+          "whichever of them the points support");
     visit("layout", layout, "",
           "one page, two pages, several sheets lying apart, or one or two decided by whether there is a gutter");
     visit("smoothing", smoothing, "", "multiplies the stiffness of the cut profile that suits the noise");

@@ -11,7 +11,8 @@ namespace pagesweep {
 namespace {
 
 constexpr double margin_mm = 8;
-constexpr double node_spacing_mm = 5;
+constexpr double model_node_spacing_mm = 5, creased_node_spacing_mm = 2.5;
+constexpr double explained_sigmas = 4;  // strain beyond so many standard deviations is not noise
 constexpr double coarsest_spacing_mm = 2, finest_spacing_mm = 0.7;
 constexpr double interpolation_error_mm = 0.01;
 constexpr double guessed_weight = 1e-3;  // of lengths where nothing was measured
@@ -87,14 +88,11 @@ FlatPage::FlatPage(const RuledSurface& model, const Differences& differences, st
       gutter_(gutter),
       cut_(model, alpha_range(model, places, gutter).low, alpha_range(model, places, gutter).high) {
   const Range alpha = alpha_range(model, places, gutter);
-  const double from = cut_.length_at(alpha.low) - (gutter == GutterSide::left ? 0 : margin_mm);
-  const double to = cut_.length_at(alpha.high) + (gutter == GutterSide::right ? 0 : margin_mm);
-  columns_ = std::max(3, static_cast<int>(std::ceil((to - from) / node_spacing_mm)) + 1);
-  length0_ = from;
-  length_step_ = (to - from) / (columns_ - 1);
+  length0_ = cut_.length_at(alpha.low) - (gutter == GutterSide::left ? 0 : margin_mm);
+  length1_ = cut_.length_at(alpha.high) + (gutter == GutterSide::right ? 0 : margin_mm);
   b0_ = model.b_low - margin_mm;
-  rows_ = std::max(3, static_cast<int>(std::ceil((model.b_high - b0_ + margin_mm) / node_spacing_mm)) + 1);
-  b_step_ = (model.b_high + margin_mm - b0_) / (rows_ - 1);
+  b1_ = model.b_high + margin_mm;
+  set_nodes(model_node_spacing_mm);
   for (const Support& place : places) places_.push_back(place.plan);
 
   // To begin with: arc length along the cut, length along the ruling, t downwards.
@@ -109,9 +107,24 @@ FlatPage::FlatPage(const RuledSurface& model, const Differences& differences, st
   spacing_mm_ = fine_enough_spacing();
 }
 
+void FlatPage::set_nodes(double spacing_mm) {
+  columns_ = std::max(3, static_cast<int>(std::ceil((length1_ - length0_) / spacing_mm)) + 1);
+  length_step_ = (length1_ - length0_) / (columns_ - 1);
+  rows_ = std::max(3, static_cast<int>(std::ceil((b1_ - b0_) / spacing_mm)) + 1);
+  b_step_ = (b1_ - b0_) / (rows_ - 1);
+}
+
 void FlatPage::follow_measurement() {
   follows_ = true;
-  lay_flat(Image<Eigen::Vector2d>(flat_));
+  const Image<Eigen::Vector2d> by_model = flat_;
+  set_nodes(creased_node_spacing_mm);
+  Image<Eigen::Vector2d> start(columns_, rows_);
+  for (int j = 0; j < rows_; ++j)
+    for (int i = 0; i < columns_; ++i)
+      start(i, j) = interpolate_nodes(by_model, i * (by_model.width() - 1.0) / (columns_ - 1),
+                                      j * (by_model.height() - 1.0) / (rows_ - 1));
+  lay_flat(start);
+  spacing_mm_ = fine_enough_spacing();
 }
 
 Eigen::Vector3d FlatPage::model_point(double i, double j) const {
@@ -130,10 +143,70 @@ Eigen::Vector3d FlatPage::above(double i, double j) const {
 }
 
 void FlatPage::lay_flat(const Image<Eigen::Vector2d>& start) {
-  Sheet sheet{columns_, rows_, [this](double i, double j) { return surface_point(i, j); }};
-  if (follows_) sheet.weight = [this](int i, int j) { return is_measured(above(i, j)) ? 1 : guessed_weight; };
+  // Lengths of edges and diagonals are sums of chords between the points of a lattice four times as fine.
+  constexpr int finer = 4;
+  Image<Eigen::Vector3d> lattice(finer * (columns_ - 1) + 1, finer * (rows_ - 1) + 1);
+  parallel_rows(lattice.height(), [&](int j) {
+    for (int i = 0; i < lattice.width(); ++i) lattice(i, j) = surface_point(double(i) / finer, double(j) / finer);
+  });
+  Sheet sheet{columns_, rows_, [&](double i, double j) {
+                return lattice(static_cast<int>(std::lround(finer * i)), static_cast<int>(std::lround(finer * j)));
+              }};
+  if (follows_)
+    sheet.weight = [&](int i, int j) { return is_measured(lattice(finer * i, finer * j)) ? 1 : guessed_weight; };
   flat_ = flatten(sheet, start, &distortion_);
   turn_upright();
+  measure_strain();
+}
+
+double Strain::share_beyond(double least) const {
+  double measured = 0, beyond = 0;
+  for (std::size_t k = 0; k < relative.size(); ++k) {
+    if (std::isnan(relative.data()[k])) continue;
+    ++measured;
+    beyond += std::abs(relative.data()[k]) > std::max(least, explained_sigmas * double(sigma.data()[k]));
+  }
+  return measured > 0 ? beyond / measured : 0;
+}
+
+/// Compares the edges of the grid on the measured sheet with the same edges laid flat. A height's noise lengthens an
+/// edge by its share of the slope against the model, and on the level by its square.
+void FlatPage::measure_strain() {
+  Image<Eigen::Vector3d> measured(2 * columns_ - 1, 2 * rows_ - 1);  // nodes and what lies halfway
+  Image<float> height_sigma(columns_, rows_, not_a_number);
+  parallel_rows(measured.height(), [&](int j) {
+    for (int i = 0; i < measured.width(); ++i) {
+      measured(i, j) = above(0.5 * i, 0.5 * j);
+      PixelStatus status = PixelStatus::not_computed;
+      if (i % 2 == 0 && j % 2 == 0) look_up_status(measured(i, j), 1, height_sigma(i / 2, j / 2), status);
+    }
+  });
+  strain_.relative = strain_.sigma = Image<float>(columns_, rows_, not_a_number);
+  Image<Eigen::Vector3d> sums(columns_, rows_, Eigen::Vector3d::Zero());  // strain, variance, edges
+  const auto add = [&](int i, int j, int i2, int j2) {
+    if (i2 >= columns_ || j2 >= rows_) return;
+    const double sigma = std::hypot(double(height_sigma(i, j)), double(height_sigma(i2, j2)));
+    if (!std::isfinite(sigma)) return;
+    const Eigen::Vector3d &a = measured(2 * i, 2 * j), &m = measured(i + i2, j + j2), &b = measured(2 * i2, 2 * j2);
+    const double flat = (flat_(i2, j2) - flat_(i, j)).norm();
+    const double length = (4 * ((m - a).norm() + (b - m).norm()) - (b - a).norm()) / 3;
+    const double chord = (model_point(i2, j2) - model_point(i, j)).norm();
+    const double rise = std::sqrt(std::max(0.0, std::pow((b - a).norm() / chord, 2) - 1)), noise = sigma / flat;
+    const Eigen::Vector3d edge(length / flat - 1, std::pow(rise * noise, 2) + std::pow(noise, 4), 1);
+    sums(i, j) += edge;
+    sums(i2, j2) += edge;
+  };
+  for (int j = 0; j < rows_; ++j)
+    for (int i = 0; i < columns_; ++i) {
+      add(i, j, i + 1, j);
+      add(i, j, i, j + 1);
+    }
+  for (std::size_t k = 0; k < sums.size(); ++k) {
+    const Eigen::Vector3d& sum = sums.data()[k];
+    if (!(sum.z() > 0)) continue;
+    strain_.relative.data()[k] = static_cast<float>(sum.x() / sum.z());
+    strain_.sigma.data()[k] = static_cast<float>(std::sqrt(sum.y()) / sum.z());
+  }
 }
 
 /// Paper coordinates of the model's spot at a place (p, q).
@@ -228,10 +301,16 @@ PageSurface FlatPage::sample(const PlanFrame& frame) const {
   page.measured = page.model;
   page.sigma = Image<float>(page.columns(), page.rows(), not_a_number);
   page.status = Image<PixelStatus>(page.columns(), page.rows(), PixelStatus::not_computed);
+  page.strain = page.strain_sigma = page.cover_mm = page.sigma;
   for_each_node(page, [&](int i, int j, const Eigen::Vector2d& node) {
     const Eigen::Vector3d point = model_point(node.x(), node.y()), normal = model_normal(node.x(), node.y());
     const Eigen::Vector3d measured = measured_above(model_, differences_, point, normal);
     look_up_status(measured, normal.z(), page.sigma(i, j), page.status(i, j));
+    page.cover_mm(i, j) = cover_above(measured);
+    const int column = std::clamp(static_cast<int>(std::lround(node.x())), 0, columns_ - 1);
+    const int row = std::clamp(static_cast<int>(std::lround(node.y())), 0, rows_ - 1);
+    page.strain(i, j) = strain_.relative(column, row);
+    page.strain_sigma(i, j) = strain_.sigma(column, row);
     page.measured(i, j) = frame.rig_from_plan(measured).cast<float>();
     page.model(i, j) = frame.rig_from_plan(follows_ ? measured : point).cast<float>();
   });
@@ -263,6 +342,12 @@ void FlatPage::look_up_status(const Eigen::Vector3d& measured, double normal_z, 
   if (!differences_.status.contains(i, j)) return;
   status = differences_.status(i, j);
   sigma = differences_.sigma(i, j) * static_cast<float>(normal_z);
+}
+
+float FlatPage::cover_above(const Eigen::Vector3d& measured) const {
+  const int i = static_cast<int>(std::lround(differences_.field->i_of(measured.x())));
+  const int j = static_cast<int>(std::lround(differences_.field->j_of(measured.y())));
+  return differences_.cover_mm.contains(i, j) ? differences_.cover_mm(i, j) : not_a_number;
 }
 
 /// Largest error of the interpolated model in the middle of cells, a sample of their rows, the gutter's among them.

@@ -32,6 +32,14 @@ class CutLength {
 /// Which end of a page is the gutter.
 enum class GutterSide { none, left, right };
 
+/// By how much the measured sheet is longer than its flattening, around the nodes of a grid.
+struct Strain {
+  Image<float> relative;  ///< mean over the edges at a node, measured length over flat length, minus 1; NaN: unmeasured
+  Image<float> sigma;     ///< one standard deviation that follows from the heights' own
+  /// Share of the measured nodes that are strained by more than `least`, and by more than the measurement explains.
+  double share_beyond(double least) const;
+};
+
 /// A page's model surface and its flattening, as functions.
 class FlatPage {
  public:
@@ -44,12 +52,15 @@ class FlatPage {
   /// The page on a regular grid of paper coordinates, fine enough that interpolation errs by less than 0.01 mm.
   PageSurface sample(const PlanFrame& frame) const;
   const Distortion& distortion() const { return distortion_; }
+  const Strain& strain() const { return strain_; }
 
  private:
   Eigen::Vector3d model_point(double i, double j) const;
   Eigen::Vector3d model_normal(double i, double j) const;
   Eigen::Vector3d above(double i, double j) const;
   Eigen::Vector3d surface_point(double i, double j) const { return follows_ ? above(i, j) : model_point(i, j); }
+  void set_nodes(double spacing_mm);
+  void measure_strain();
   void lay_flat(const Image<Eigen::Vector2d>& start);
   Eigen::Vector2d paper_at(const Eigen::Vector2d& plan) const;
   void turn_upright();
@@ -61,6 +72,7 @@ class FlatPage {
   double interpolation_error(double spacing_mm) const;
   double fine_enough_spacing() const;
   bool is_measured(const Eigen::Vector3d& point) const;
+  float cover_above(const Eigen::Vector3d& measured) const;
   void look_up_status(const Eigen::Vector3d& measured, double normal_z, float& sigma, PixelStatus& status) const;
 
   const RuledSurface& model_;
@@ -68,13 +80,14 @@ class FlatPage {
   std::vector<Eigen::Vector2d> places_;
   GutterSide gutter_;
   CutLength cut_;
-  double length0_ = 0, length_step_ = 1, b0_ = 0, b_step_ = 1;
+  double length0_ = 0, length1_ = 0, length_step_ = 1, b0_ = 0, b1_ = 0, b_step_ = 1;
   int columns_ = 0, rows_ = 0;
   double spacing_mm_ = 2;
   bool follows_ = false;
   Image<Eigen::Vector2d> flat_;             ///< [mm] paper (s, t) of each node
   Eigen::Vector2d low_{0, 0}, high_{0, 0};  ///< [mm] paper coordinates that the grid covers
   Distortion distortion_;
+  Strain strain_;
 };
 
 }  // namespace pagesweep
