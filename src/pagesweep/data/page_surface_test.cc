@@ -43,5 +43,22 @@ TEST(PageSurface, GoesOnStraightBeyondItsGrid) {
   }
 }
 
+TEST(PageSurface, SumsUpStrainOfWhatIsMeasured) {
+  PageSurface surface = cylinder_of_radius(30, 1);
+  EXPECT_EQ(summarise_strain(surface).rms, 0) << "not computed";
+  surface.strain = surface.strain_sigma = Image<float>(41, 11, 1e-4f);
+  surface.status = Image<PixelStatus>(41, 11, PixelStatus::ok);
+  EXPECT_NEAR(summarise_strain(surface).rms, 1e-4, 1e-9);
+  EXPECT_EQ(summarise_strain(surface).unexplained_share, 0);
+  surface.strain(3, 4) = -2e-3f;
+  EXPECT_NEAR(summarise_strain(surface).unexplained_share, 1.0 / 451, 1e-9);
+  surface.strain_sigma(3, 4) = 1e-3f;
+  EXPECT_EQ(summarise_strain(surface).unexplained_share, 0) << "noise explains it";
+  surface.strain(3, 4) = 1;
+  surface.status(3, 4) = PixelStatus::covered;
+  EXPECT_NEAR(summarise_strain(surface).rms, 1e-4, 1e-9) << "a guess does not count";
+  EXPECT_NEAR(covered_share(surface), 1.0 / 451, 1e-9);
+}
+
 }  // namespace
 }  // namespace pagesweep

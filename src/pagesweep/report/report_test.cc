@@ -117,6 +117,8 @@ struct Book {
     surface.model_name = "cylinder";
     surface.model = surface.measured = Image<Eigen::Vector3f>(96, 130);
     surface.status = Image<PixelStatus>(96, 130, PixelStatus::ok);
+    surface.strain = surface.strain_sigma = Image<float>(96, 130, 1e-4f);
+    surface.strain(30, 70) = 3e-3f;
     for (int j = 0; j < 130; ++j)
       for (int i = 0; i < 96; ++i) {
         const float dent = 0.8f * std::exp(-std::hypot(static_cast<float>(i) - 30, static_cast<float>(j) - 70) / 8);
@@ -141,6 +143,16 @@ class ReportTest : public testing::Test {
 
   fs::path folder_;
 };
+
+TEST_F(ReportTest, TellsWhereTheSheetSeemsStretched) {
+  const Book book;
+  write_report(folder_, book.inputs);
+  const auto page = json()["pages"][0];
+  EXPECT_NEAR(page["strain_rms"].get<double>(), 1e-4, 2e-5);
+  EXPECT_NEAR(page["unexplained_strain_share"].get<double>(), 1.0 / (96 * 130), 1e-9);
+  EXPECT_EQ(page["covered_share"].get<double>(), 0);
+  EXPECT_THAT(html(), HasSubstr("Paper does not stretch"));
+}
 
 TEST_F(ReportTest, IsOneSelfContainedPageAndLeavesNothingElse) {
   const Book book;

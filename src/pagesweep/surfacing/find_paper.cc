@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "pagesweep/base/parallel.h"
+
 namespace pagesweep {
 namespace {
 
@@ -13,8 +15,9 @@ constexpr double print_mm = 5;          // half of the largest dark stroke that 
 constexpr double clear_contrast = 0.6;  // table: brightness below this share of the paper's
 constexpr double step_mm = 1;           // height step between neighbours that ends a surface
 constexpr double cover_step_mm = 0.4;   // the same where a surface lies on paper
-constexpr double steepest = 2.2;        // dz / d(p, q) beyond which a surface ends (65 degrees)
-constexpr double edge_drop_mm = 1.5;    // table lies lower than the paper's edge by more
+constexpr double least_cover_mm2 = 30;
+constexpr double steepest = 2.2;      // dz / d(p, q) beyond which a surface ends (65 degrees)
+constexpr double edge_drop_mm = 1.5;  // table lies lower than the paper's edge by more
 constexpr double table_depth_mm = 5, table_flatness_mm = 0.7;
 
 /// Largest (or smallest) value within `reach` cells along the rows, or along the columns; NaN where there is none.
@@ -64,6 +67,41 @@ double split_brightness(const Image<float>& ground, const Image<std::uint8_t>& m
   return contrast < clear_contrast ? std::exp(threshold) : 0;
 }
 
+using Cell = std::array<int, 2>;
+
+/// The rise from one cell to another of its row or column, as far as it is none that the slopes at two other cells and
+/// all between them lead to [mm].
+double unexplained_rise(const HeightField& field, Cell from, Cell to, Cell slope_from, Cell slope_to) {
+  const Image<float>& slopes = from[0] == to[0] ? field.slope_q : field.slope_p;
+  const double distance_mm = (to[0] - from[0] + to[1] - from[1]) * field.cell_mm;
+  const double a = slopes(slope_from[0], slope_from[1]) * distance_mm,
+               b = slopes(slope_to[0], slope_to[1]) * distance_mm;
+  const double rise = field.z(to[0], to[1]) - field.z(from[0], from[1]);
+  return rise - std::clamp(rise, std::min(a, b), std::max(a, b));
+}
+
+/// Cells of a mask without those on a step. The slopes beside a step explain it not, even where the fits make a ramp
+/// of it.
+Image<std::uint8_t> without_steps(const HeightField& field, const Image<std::uint8_t>& mask) {
+  constexpr int half = 2, aside = 5;
+  Image<std::uint8_t> level = mask;
+  const auto is_step = [&](int i, int j, int di, int dj) {
+    const Cell a{i - half * di, j - half * dj}, b{i + half * di, j + half * dj};
+    Cell before{i - aside * di, j - aside * dj}, after{i + aside * di, j + aside * dj};
+    const auto is_in = [&](const Cell& c) { return mask.contains(c[0], c[1]) && mask(c[0], c[1]); };
+    if (!is_in(a) || !is_in(b)) return false;
+    if (!is_in(before)) before = after;
+    if (!is_in(before)) return false;
+    if (!is_in(after)) after = before;
+    return std::abs(unexplained_rise(field, a, b, before, after)) > cover_step_mm;
+  };
+  parallel_rows(mask.height(), [&](int j) {
+    for (int i = 0; i < mask.width(); ++i)
+      if (mask(i, j) && (is_step(i, j, 1, 0) || is_step(i, j, 0, 1))) level(i, j) = 0;
+  });
+  return level;
+}
+
 /// A connected piece of surface of one brightness class.
 struct Piece {
   bool bright = true;
@@ -106,7 +144,8 @@ class Pieces {
     Image<std::uint8_t> cover(field_.columns(), field_.rows(), 0);
     for (Piece& piece : pieces_) {
       if (piece.paper) continue;
-      if (step_up_to(piece) > cover_step_mm)
+      if (static_cast<double>(piece.cells.size()) * field_.cell_mm * field_.cell_mm > least_cover_mm2 &&
+          step_up_to(piece) > cover_step_mm)
         for (const int k : piece.cells) cover.data()[k] = 1;
     }
     return cover;
@@ -225,20 +264,18 @@ class Pieces {
   /// By how much a piece is higher than the paper around it beyond what the slopes on either side explain: the median
   /// over its rim [mm]; 0 if it has none.
   double step_up_to(const Piece& piece) const {
-    constexpr int reach = 3;  // a cell on the edge itself sees both sides
+    constexpr int shortest = 3, longest = 8;  // across the cells of the step itself
     std::vector<double> steps;
     for (const int k : piece.cells) {
       const int i = k % field_.columns(), j = k / field_.columns();
-      for (const auto& [di, dj] : neighbours) {
-        const int i2 = i + reach * di, j2 = j + reach * dj;
-        if (!label_.contains(i2, j2) || label_(i2, j2) < 0 || label_(i2, j2) == label_(i, j)) continue;
-        if (!pieces_[static_cast<std::size_t>(label_(i2, j2))].paper) continue;
-        const Image<float>& slopes = di == 0 ? field_.slope_q : field_.slope_p;
-        const double distance_mm = reach * (di + dj) * field_.cell_mm;
-        const double by_here = slopes(i, j) * distance_mm, by_there = slopes(i2, j2) * distance_mm;
-        const double rise = field_.z(i2, j2) - field_.z(i, j);
-        steps.push_back(std::clamp(rise, std::min(by_here, by_there), std::max(by_here, by_there)) - rise);
-      }
+      for (const auto& [di, dj] : neighbours)
+        for (int reach = shortest; reach <= longest; ++reach) {
+          const int i2 = i + reach * di, j2 = j + reach * dj;
+          if (!label_.contains(i2, j2) || label_(i2, j2) == label_(i, j)) break;
+          if (label_(i2, j2) < 0 || !pieces_[static_cast<std::size_t>(label_(i2, j2))].paper) continue;
+          steps.push_back(-unexplained_rise(field_, {i, j}, {i2, j2}, {i, j}, {i2, j2}));
+          break;
+        }
     }
     if (steps.empty()) return 0;
     const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
@@ -298,11 +335,45 @@ void trim_mixed_cells(Image<std::uint8_t>& paper, const Image<std::uint8_t>& mea
           if (before.contains(i + di, j + dj) && measured(i + di, j + dj) && !before(i + di, j + dj)) paper(i, j) = 0;
 }
 
-/// Takes away what lies on the paper, and two cells around it, which may hold points of both.
-void take_cover_away(const HeightField& field, Image<std::uint8_t>& paper) {
-  constexpr int reach = 2;
+/// Whether a place beside the paper stands above it: higher than a near cell of paper, and than its slope leads to.
+bool stands_above(const HeightField& field, const Image<std::uint8_t>& paper, int i, int j) {
+  constexpr int reach = 4;
+  for (int dj = -reach; dj <= reach; ++dj)
+    for (int di = -reach; di <= reach; ++di) {
+      const int i2 = i + di, j2 = j + dj;
+      if (!paper.contains(i2, j2) || !paper(i2, j2)) continue;
+      const double rise = field.z(i, j) - field.z(i2, j2);
+      const double expected = -(di * field.slope_p(i2, j2) + dj * field.slope_q(i2, j2)) * field.cell_mm;
+      if (rise - std::max(0.0, expected) > cover_step_mm) return true;
+    }
+  return false;
+}
+
+/// Adds those cells of a mask that have most of their 5 x 5 neighbours in it: nothing that stands on paper is as narrow
+/// as a row of cells in the gutter.
+void keep_broad(const Image<std::uint8_t>& mask, Image<std::uint8_t>& kept) {
+  for (int j = 2; j + 2 < mask.height(); ++j)
+    for (int i = 2; i + 2 < mask.width(); ++i) {
+      if (!mask(i, j)) continue;
+      int count = 0;
+      for (int dj = -2; dj <= 2; ++dj)
+        for (int di = -2; di <= 2; ++di) count += mask(i + di, j + dj);
+      if (2 * count > 25) kept(i, j) = 1;
+    }
+}
+
+/// Takes away what lies on the paper or stands beside it, and the cells around that, which may hold points of both.
+void take_cover_away(const HeightField& field, const Image<std::uint8_t>& measured, Image<std::uint8_t>& paper) {
+  constexpr int reach = 5;  // the cells of the step, and one
   const Image<std::uint8_t> whole = paper;
-  const Image<std::uint8_t> cover = Pieces(field, whole, whole, cover_step_mm).choose_cover();
+  const Image<std::uint8_t> level = without_steps(field, whole);
+  Image<std::uint8_t> cover = Pieces(field, level, level, cover_step_mm).choose_cover();
+  Image<std::uint8_t> beside(paper.width(), paper.height(), 0);
+  parallel_rows(paper.height(), [&](int j) {
+    for (int i = 0; i < paper.width(); ++i)
+      beside(i, j) = measured(i, j) && !whole(i, j) && stands_above(field, whole, i, j);
+  });
+  keep_broad(beside, cover);
   for (int j = 0; j < paper.height(); ++j)
     for (int i = 0; i < paper.width(); ++i)
       if (cover(i, j))
@@ -322,7 +393,7 @@ Image<std::uint8_t> find_paper(const HeightField& field, bool small_sheets) {
   for (std::size_t k = 0; k < bright.size(); ++k) bright.data()[k] = !(ground.data()[k] < threshold);
   Image<std::uint8_t> paper = Pieces(field, measured, bright).choose_paper(small_sheets ? 100 : 10);
   trim_mixed_cells(paper, measured);
-  take_cover_away(field, paper);
+  take_cover_away(field, measured, paper);
   return paper;
 }
 
