@@ -45,7 +45,7 @@ double scale_error(const PageSurface& surface, bool across) {
 }
 
 /// Share of the page's measured nodes on which something lies, in percent.
-double covered_share(const PageSurface& surface) {
+double covered_percent(const PageSurface& surface) {
   double covered = 0, paper = 0;
   for (const PixelStatus status : surface.status.pixels()) {
     covered += status == PixelStatus::covered;
@@ -74,7 +74,7 @@ void add_geometry(const Page& page, const PageSurface& surface, const Image<floa
               no_lines);
   figures.add("skew", "of the text lines, clockwise", known(lines.skew_rad * 180 / M_PI), "degrees", no_lines);
   figures.add("measured", "share of the page that rests on measured points", 100 * page.measured_share, "%");
-  figures.add("covered", "share on which something lies", covered_share(surface), "%");
+  figures.add("covered", "share on which something lies", covered_percent(surface), "%");
   figures.add("unseen", "share that the scan does not show", unseen_share(page.scan_map), "%");
 }
 
