@@ -22,8 +22,8 @@ constexpr double smallest_kink = 0.15;  // change of slope below which two pages
 constexpr double largest_correction_mm = 4;
 constexpr double many_outliers = 0.25;
 constexpr double nearest_to_gutter_mm = 0.2;
-constexpr double mixed_cells = 1;       // beside the gutter: as far as the spot of a pixel reaches
-constexpr double least_lift_mm = 0.01;  // of points there, by which they are known to lie between the pages
+constexpr double mixed_cells = 1;             // beside the gutter: as far as the spot of a pixel reaches
+constexpr double least_lift_mm = 0.01;        // of points there, by which they are known to lie between the pages
 constexpr double strain_that_matters = 5e-4;  // over 100 mm of paper 0.05 mm
 constexpr double share_that_matters = 0.05;
 
@@ -182,21 +182,22 @@ PageSurface sample(const FlatPage& flat, const HeightField& field, SurfaceModel 
   return page;
 }
 
-/// Whether the sheet as measured is longer or shorter than the model's flattening in more places than dents of the
-/// paper and the rims of the measurement account for.
-bool is_no_cylinder(const FlatPage& by_model) {
-  return by_model.strain().share_beyond(strain_that_matters) > share_that_matters;
-}
+/// Share of the sheet that is longer or shorter, as measured, than in the flattening.
+double strained_share(const FlatPage& flat) { return flat.strain().share_beyond(strain_that_matters); }
 
 PageSurface finish_page(const FittedPage& fitted, const HeightField& field, const SurfaceOptions& options) {
   const Differences differences = measure_differences(field, fitted.cells, fitted.model, options.neighbourhood_mm);
   const FlatPage by_model(fitted.model, differences, fitted.places, fitted.gutter);
-  const bool follow = options.model == SurfaceModel::developable ||
-                      (options.model == SurfaceModel::automatic && is_no_cylinder(by_model));
-  if (!follow) return sample(by_model, field, SurfaceModel::cylinder);
+  // Dents of the paper and the rims of the measurement strain a good cylinder as well, in a few places.
+  const bool may_follow = options.model == SurfaceModel::developable ||
+                          (options.model == SurfaceModel::automatic && strained_share(by_model) > share_that_matters);
+  if (!may_follow) return sample(by_model, field, SurfaceModel::cylinder);
   const Differences creased = crease_differences(differences, fitted.model, options.neighbourhood_mm);
   FlatPage flat(fitted.model, creased, fitted.places, fitted.gutter);
   flat.follow_measurement();
+  // Points too coarse for the sheet's folds make it one that no paper could be: the model knows better.
+  if (options.model == SurfaceModel::automatic && strained_share(flat) > strained_share(by_model))
+    return sample(by_model, field, SurfaceModel::cylinder);
   return sample(flat, field, SurfaceModel::developable);
 }
 
