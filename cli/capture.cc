@@ -51,7 +51,8 @@ std::string take_picture(ScanPictureSource& scanner, Capture& capture) {
 void run(const Arguments& arguments) {
   const Rig rig = read_rig(arguments.rig);
   if (std::filesystem::exists(arguments.output / "capture.json"))
-    throw pagesweep::cannot_write(arguments.output, "there is a capture already, which is never overwritten: name a new folder");
+    throw pagesweep::cannot_write(arguments.output,
+                                  "there is a capture already, which is never overwritten: name a new folder");
   OutputFolder output(arguments.output, "capture.json");
   LiveView view(arguments.common.quiet);
   OpenedRig opened = open(arguments.input, rig, view);

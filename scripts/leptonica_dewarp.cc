@@ -2,8 +2,10 @@
 // Dewarps a page with Leptonica and says where each pixel came from. scripts/comparison compiles and runs it.
 // Usage: leptonica_dewarp PAGE.png FLAT.png ORIGIN.bin
 //
-// ORIGIN.bin has for each pixel of FLAT.png, row by row, two unsigned 16-bit numbers in the machine's order: row + 1, column
-// + 1 in PAGE.png, or 0, 0 if it came from nowhere. They are found by dewarping a picture whose pixels say where they are.
+// ORIGIN.bin has for each pixel of FLAT.png, row by row, two unsigned 16-bit numbers in the machine's order: row + 1,
+// column
+// + 1 in PAGE.png, or 0, 0 if it came from nowhere. They are found by dewarping a picture whose pixels say where they
+// are.
 #include <leptonica/allheaders.h>
 
 #include <cstdint>

@@ -83,7 +83,8 @@ TEST(Calibrate, TheRigsYIsTheWayTheLightGoes) {
   SimulatedCorners corners{.rig = simulated_rig()};
   corners.noise_px = 1e-4;
   CalibrationInput input = corners.input(3);
-  // Over the first board, which lies flat, the light goes along -x and a little y of the board; a tilted one has less say.
+  // Over the first board, which lies flat, the light goes along -x and a little y of the board; a tilted one has less
+  // say.
   const Eigen::Vector2d way = Eigen::Vector2d(-1, 0.1).normalized();
   input.light_directions = {{4, Eigen::Vector2d(0, 1)}, {0, way}};
   const Calibration calibration = calibrate(input, {});
