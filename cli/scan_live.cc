@@ -97,6 +97,38 @@ void finish_recording(const LiveScan& scan, CaptureRecorder& recorder, const Ope
   write_capture(capture);
 }
 
+/// What makes the result a partial one; empty: nothing.
+std::string problem_of(const LiveSource& live, const LatePicture& picture, const CaptureRecorder* recorder) {
+  std::string problem = live.ended_early();
+  for (const std::string& other : {picture.problem(), recorder ? recorder->trouble() : std::string()})
+    if (!other.empty()) problem += (problem.empty() ? "" : "; ") + other;
+  return problem;
+}
+
+void warn(const std::string& problem, const LiveView& view, const LiveSource& live, ConsoleProgress& console) {
+  if (!problem.empty()) console.warn("partial: " + problem);
+  for (const std::string& remark : view.remarks()) console.warn(remark);
+  for (const auto& camera : live.status().cameras)
+    if (camera.counts.damaged + camera.counts.lost + camera.counts.late > 0) console.warn(describe(camera));
+}
+
+void write_result(OutputFolder& output, const LiveScan& arguments, const LiveSource& live, const Scan& scan,
+                  const Picture* picture, ConsoleProgress& console) {
+  console.begin("writing the pages");
+  output.begin();
+  write_measurement(output.path(), scan.measurement);
+  if (picture) write_pages(output.path(), scan.pages, scan.surfaces, arguments.files);
+  RunResult result{.title = arguments.output.filename().string(),
+                   .sequences = live.sequences(),
+                   .measurement = scan.measurement,
+                   .surfaces = scan.surfaces,
+                   .pages = scan.pages,
+                   .scan = picture};
+  add_measuring_options(result.options, arguments.options);
+  add_flattening_options(result.options, arguments.options);
+  finish_result(output, result, console, arguments.common);
+}
+
 }  // namespace
 
 void scan_live(const LiveScan& arguments) {
@@ -138,29 +170,12 @@ void scan_live(const LiveScan& arguments) {
   if (picture) scan = flatten(std::move(scan.measurement), *picture, rig, options, progress);
 
   view.finish(live.status());
-  std::string problem = live.ended_early();
-  for (const std::string& other : {late_picture.problem(), recorder ? recorder->trouble() : std::string()})
-    if (!other.empty()) problem += (problem.empty() ? "" : "; ") + other;
-  if (!problem.empty()) console.warn("partial: " + problem);
-  for (const std::string& remark : view.remarks()) console.warn(remark);
-  for (const auto& camera : live.status().cameras)
-    if (camera.counts.damaged + camera.counts.lost + camera.counts.late > 0) console.warn(describe(camera));
+  const std::string problem = problem_of(live, late_picture, recorder ? &*recorder : nullptr);
+  warn(problem, view, live, console);
   if (!arguments.common.quiet)
     fmt::print(stderr, "points were finished {:.2f} s after the last frame\n", *points_after_s);
 
-  console.begin("writing the pages");
-  output.begin();
-  write_measurement(output.path(), scan.measurement);
-  if (picture) write_pages(output.path(), scan.pages, scan.surfaces, arguments.files);
-  RunResult result{.title = arguments.output.filename().string(),
-                   .sequences = live.sequences(),
-                   .measurement = scan.measurement,
-                   .surfaces = scan.surfaces,
-                   .pages = scan.pages,
-                   .scan = picture};
-  add_measuring_options(result.options, arguments.options);
-  add_flattening_options(result.options, arguments.options);
-  finish_result(output, result, console, arguments.common);
+  write_result(output, arguments, live, scan, picture, console);
   if (recorder) {
     finish_recording(arguments, *recorder, opened, rig, picture);
     recording->finish();
