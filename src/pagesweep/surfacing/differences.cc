@@ -92,7 +92,8 @@ double noise_factor_of(const Image<CellMean>& cells, double cell_mm) {
   constexpr double radius_cells = 2.5;
   const double no_edges = std::numeric_limits<double>::infinity();
   std::vector<double> scatters;
-  for (const LocalFit& fit : fit_lattice(cells, cell_mm, pitch, {radius_cells * cell_mm, 2, no_edges}).pixels())
+  const Image<LocalFit> fits = fit_lattice(cells, cell_mm, pitch, {radius_cells * cell_mm, 2, no_edges});
+  for (const LocalFit& fit : fits.pixels())
     if (fit.ok) scatters.push_back(fit.scatter);
   if (scatters.empty()) return 1;
   // The lower quartile: most windows of a crumpled sheet hold a crease. Where none does, scatters of so few cells have
