@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/surfacing/creased_sheet.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/surfacing/sheet_operator.h"
 
 namespace pagesweep {
 namespace {
 
 constexpr int most_steps = 60;       // of conjugate gradients a round
+constexpr int rows_at_once = 16;     // for a thread
 constexpr double settled = 1e-3;     // of the gradient's length against the round's first
 constexpr double robust_sigmas = 3;  // Cauchy's weights
 
@@ -30,6 +32,31 @@ struct Reading {
   double weight = 0;
   double robust = 1;
 };
+
+/// The part of a grid in which there is a sheet.
+struct Extent {
+  int i0, j0, i1, j1;  ///< first, and one beyond the last
+  bool empty() const { return i1 <= i0; }
+  template <class T>
+  Image<T> cut(const Image<T>& whole) const {
+    Image<T> part(i1 - i0, j1 - j0);
+    for (int j = j0; j < j1; ++j)
+      for (int i = i0; i < i1; ++i) part(i - i0, j - j0) = whole(i, j);
+    return part;
+  }
+};
+
+Extent extent_of(const Image<std::uint8_t>& within) {
+  Extent extent{within.width(), within.height(), 0, 0};
+  for (int j = 0; j < within.height(); ++j)
+    for (int i = 0; i < within.width(); ++i)
+      if (within(i, j))
+        extent = {std::min(extent.i0, i), std::min(extent.j0, j), std::max(extent.i1, i + 1),
+                  std::max(extent.j1, j + 1)};
+  // A sheet of paper has a second row and column.
+  if (!extent.empty() && (extent.i1 - extent.i0 < 2 || extent.j1 - extent.j0 < 2)) return {0, 0, 0, 0};
+  return extent;
+}
 
 class CreasedSheet {
  public:
@@ -156,117 +183,110 @@ class CreasedSheet {
     });
   }
 
-  /// Adds the derivative of half the bending energy: sum over nodes of the adjoint second differences of
-  /// stiffness h^2 (W H + H W) / 2.
-  void add_bending(const Field& z, Field& result) const {
-    Image<Bending> moment(columns(), rows());
-    const double h2 = h_ * h_;
+  /// The derivative of half the energy by the heights, as a matrix and its constant part. Twice the bending energy is
+  /// the sum over nodes of stiffness h^2 tr(W H^2).
+  void assemble(SheetOperator& sheet, NodeField& pull) const {
+    const double unit = stiffness_ / (h_ * h_);
     parallel_rows(rows(), [&](int j) {
       for (int i = 0; i < columns(); ++i) {
-        const Bending b = bending(z, i, j), w = weights_(i, j);
-        const auto scale = static_cast<float>(stiffness_ * h2);
-        moment(i, j) = {scale * (w.pp * b.pp + w.pq * b.pq),
-                        scale * (w.pq * (b.pp + b.qq) + (w.pp + w.qq) * b.pq),  // both pq and qp
-                        scale * (w.qq * b.qq + w.pq * b.pq)};
+        const Bending& w = weights_(i, j);
         const std::uint8_t has = has_(i, j);
-        if (!(has & has_pp)) moment(i, j).pp = 0;
-        if (!(has & has_qq)) moment(i, j).qq = 0;
-        if (!(has & has_pq)) moment(i, j).pq = 0;
+        const auto if_has = [&](int derivatives, float weight) {
+          return (has & derivatives) == derivatives ? static_cast<float>(unit * double(weight)) : 0.0f;
+        };
+        sheet.pp_pp(i, j) = if_has(has_pp, w.pp);
+        sheet.qq_qq(i, j) = if_has(has_qq, w.qq);
+        sheet.pp_pq(i, j) = if_has(has_pp | has_pq, w.pq);
+        sheet.qq_pq(i, j) = if_has(has_qq | has_pq, w.pq);
+        sheet.pq_pq(i, j) = if_has(has_pq, w.pp + w.qq);  // both pq and qp
       }
     });
+    for (const auto& row : readings_)
+      for (const Reading& r : row) add_products(r, sheet, pull);
+  }
+
+  static void add_products(const Reading& r, SheetOperator& sheet, NodeField& pull) {
+    const auto weight = static_cast<float>(r.weight * r.robust), push = weight * static_cast<float>(r.z);
+    std::array<float, 4> share{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const int i = r.i + static_cast<int>(k % 2), j = r.j + static_cast<int>(k / 2);
+      share[k] = static_cast<float>(r.share[k]);
+      sheet.self(i, j) += weight * share[k] * share[k];
+      pull(i, j) += push * share[k];
+    }
+    sheet.right(r.i, r.j) += weight * share[0] * share[1];
+    sheet.right(r.i, r.j + 1) += weight * share[2] * share[3];
+    sheet.upper(r.i, r.j) += weight * share[0] * share[2];
+    sheet.upper(r.i + 1, r.j) += weight * share[1] * share[3];
+    sheet.upper_right(r.i, r.j) += weight * share[0] * share[3];
+    sheet.upper_left(r.i + 1, r.j) += weight * share[1] * share[2];
+  }
+
+  /// The matrix's diagonal, roughly: as if a node had its neighbours' weights.
+  NodeField diagonal(const SheetOperator& sheet) const {
+    constexpr double bending = 4 + 0.25;
+    NodeField diagonal(columns(), rows(), 1);
+    const double unit = bending * stiffness_ / (h_ * h_);
     parallel_rows(rows(), [&](int j) {
-      const int above = std::min(j + 1, rows() - 1), below = std::max(j - 1, 0);  // nodes at the border have no moment
-      for (int i = 0; i < columns(); ++i) {
-        if (!within_(i, j)) continue;
-        const int left = std::max(i - 1, 0), right = std::min(i + 1, columns() - 1);
-        double sum = double(moment(left, j).pp) + moment(right, j).pp - 2 * double(moment(i, j).pp);
-        sum += double(moment(i, below).qq) + moment(i, above).qq - 2 * double(moment(i, j).qq);
-        sum += (double(moment(left, below).pq) + moment(right, above).pq - moment(left, above).pq -
-                moment(right, below).pq) /
-               4;
-        result(i, j) += sum / h2;
-      }
-    });
-  }
-
-  /// Adds B' w (B z - readings), or B' w B z alone.
-  void add_readings(const Field& z, bool with_data, Field& result) const {
-    for (const auto& row : readings_)
-      for (const Reading& r : row) {
-        const double push = r.weight * r.robust * (value(z, r) - (with_data ? r.z : 0));
-        result(r.i, r.j) += r.share[0] * push;
-        result(r.i + 1, r.j) += r.share[1] * push;
-        result(r.i, r.j + 1) += r.share[2] * push;
-        result(r.i + 1, r.j + 1) += r.share[3] * push;
-      }
-  }
-
-  Field diagonal() const {
-    Field diagonal(columns(), rows(), 1e-12);
-    const double h2 = h_ * h_;
-    for (int j = 0; j < rows(); ++j)
       for (int i = 0; i < columns(); ++i)
-        diagonal(i, j) += stiffness_ / h2 *
-                          (4 * (double(weights_(i, j).pp) + weights_(i, j).qq) +
-                           0.25 * (double(weights_(i, j).pp) + weights_(i, j).qq));
-    for (const auto& row : readings_)
-      for (const Reading& r : row)
-        for (int k = 0; k < 4; ++k)
-          diagonal(r.i + k % 2, r.j + k / 2) +=
-              r.weight * r.robust * r.share[static_cast<std::size_t>(k)] * r.share[static_cast<std::size_t>(k)];
+        if (within_(i, j))
+          diagonal(i, j) =
+              sheet.self(i, j) + static_cast<float>(unit * (double(weights_(i, j).pp) + double(weights_(i, j).qq)));
+    });
     return diagonal;
   }
 
-  static double dot(const Field& a, const Field& b) {
-    std::vector<double> sums(static_cast<std::size_t>(a.height()), 0);
-    parallel_rows(a.height(), [&](int j) {
-      for (int i = 0; i < a.width(); ++i) sums[static_cast<std::size_t>(j)] += a(i, j) * b(i, j);
+  /// Adds up what each row gives, whatever the order in which rows are done.
+  template <class Row>
+  double sum_rows(const Row& of_row) const {
+    std::vector<double> sums(static_cast<std::size_t>(rows()), 0);
+    parallel_ranges(rows(), rows_at_once, [&](int begin, int end) {
+      for (int j = begin; j < end; ++j) sums[static_cast<std::size_t>(j)] = of_row(j);
     });
     return std::accumulate(sums.begin(), sums.end(), 0.0);
   }
 
-  /// Calls use(k) for every node.
-  template <class Use>
-  void for_each_node(const Use& use) const {
-    const auto width = static_cast<std::size_t>(columns());
-    parallel_rows(rows(), [&](int j) {
-      for (std::size_t k = static_cast<std::size_t>(j) * width; k < (static_cast<std::size_t>(j) + 1) * width; ++k)
-        use(k);
-    });
+  void apply(const SheetOperator& sheet, const NodeField& bent, const NodeField& lifted, NodeField& result) const {
+    parallel_ranges(rows(), rows_at_once,
+                    [&](int begin, int end) { apply_rows(sheet, bent, lifted, begin, end, result); });
   }
 
   /// Conjugate gradients from the present heights.
   void improve() {
-    const Field scale = diagonal();
-    Field whole = z_;
-    for (std::size_t k = 0; k < whole.size(); ++k) whole.data()[k] += base_.data()[k];
-    Field residual(columns(), rows(), 0);
-    add_bending(whole, residual);
-    add_readings(z_, true, residual);
-    Field direction(columns(), rows(), 0), scaled = direction;
-    const auto precondition = [&] {
-      for_each_node(
-          [&](std::size_t k) { scaled.data()[k] = within_.data()[k] ? -residual.data()[k] / scale.data()[k] : 0; });
-    };
-    precondition();
-    direction = scaled;
-    double slope = -dot(residual, scaled);
-    const double first = slope;
-    for (int step = 0; step < most_steps && slope > settled * settled * first; ++step) {
-      Field bent(columns(), rows(), 0);
-      add_bending(direction, bent);
-      add_readings(direction, false, bent);
-      const double length = slope / dot(direction, bent);
-      for_each_node([&](std::size_t k) {
-        z_.data()[k] += length * direction.data()[k];
-        residual.data()[k] += length * bent.data()[k];
+    SheetOperator sheet(columns(), rows());
+    NodeField pull(columns(), rows());
+    assemble(sheet, pull);
+    const NodeField scale = diagonal(sheet);
+    NodeField whole(columns(), rows()), place = whole, residual = whole, scaled = whole, bent = whole,
+                                        direction = whole;
+    for (int j = 0; j < rows(); ++j)
+      for (int i = 0; i < columns(); ++i) {
+        place(i, j) = static_cast<float>(z_(i, j));
+        whole(i, j) = static_cast<float>(z_(i, j) + base_(i, j));
+      }
+    apply(sheet, whole, place, residual);
+    for (int j = 0; j < rows(); ++j)
+      for (int i = 0; i < columns(); ++i) residual(i, j) -= pull(i, j);
+    const auto step = [&](double length) {
+      return sum_rows([&](int j) {
+        return step_row(static_cast<float>(length), direction, bent, scale, j, place, residual, scaled);
       });
-      precondition();
-      const double next = -dot(residual, scaled);
-      const double keep = next / slope;
-      for_each_node([&](std::size_t k) { direction.data()[k] = scaled.data()[k] + keep * direction.data()[k]; });
+    };
+    double slope = step(0);
+    direction = scaled;
+    const double first = slope;
+    for (int steps = 0; steps < most_steps && slope > settled * settled * first; ++steps) {
+      apply(sheet, direction, direction, bent);
+      const double length = slope / sum_rows([&](int j) { return dot_row(direction, bent, j); });
+      const double next = step(length);
+      parallel_ranges(rows(), rows_at_once, [&](int begin, int end) {
+        for (int j = begin; j < end; ++j) turn_row(static_cast<float>(next / slope), scaled, j, direction);
+      });
       slope = next;
     }
+    for (int j = 0; j < rows(); ++j)
+      for (int i = 0; i < columns(); ++i)
+        if (within_(i, j)) z_(i, j) = static_cast<double>(place(i, j));
   }
 
   const Field& base_;
@@ -285,7 +305,16 @@ class CreasedSheet {
 Image<double> fit_creased_sheet(const Image<CellMean>& cells, const Image<double>& base, double cell_mm,
                                 double noise_factor, const Image<std::uint8_t>& within, const Image<double>& start,
                                 const CreaseOptions& options) {
-  return CreasedSheet(cells, base, cell_mm, noise_factor, within, start, options).fit();
+  const Extent extent = extent_of(within);
+  if (extent.empty()) return start;
+  const Image<std::uint8_t> inside = extent.cut(within);
+  const Image<double> ground = extent.cut(base);
+  CreasedSheet sheet(extent.cut(cells), ground, cell_mm, noise_factor, inside, extent.cut(start), options);
+  const Image<double> fitted = sheet.fit();
+  Image<double> heights = start;
+  for (int j = 0; j < fitted.height(); ++j)
+    for (int i = 0; i < fitted.width(); ++i) heights(extent.i0 + i, extent.j0 + j) = fitted(i, j);
+  return heights;
 }
 
 }  // namespace pagesweep
