@@ -50,48 +50,10 @@ double paper_light(const PaperView& view, const Picture& scan, const TransferCur
   return *at;
 }
 
-/// Encodes light as samples: the inverse of a tone curve, from a table that is as fine as the samples need.
-class Encoder {
- public:
-  Encoder(const TransferCurve& curve, int bit_depth) {
-    const int white = (1 << bit_depth) - 1;
-    // Even steps of the square root of light: steps of light are fine where the curve is steep.
-    for (int i = 0; i <= cells; ++i)
-      table_.push_back(static_cast<float>(curve.sample(std::pow(double(i) / cells, 2)) * white));
-  }
-  float operator()(float light) const {
-    const float place = std::sqrt(std::clamp(light, 0.0f, 1.0f)) * cells;
-    const int k = std::min(static_cast<int>(place), cells - 1);
-    const float* cell = &table_[static_cast<std::size_t>(k)];
-    return cell[0] + (place - static_cast<float>(k)) * (cell[1] - cell[0]);
-  }
-
- private:
-  static constexpr int cells = 1 << 14;
-  std::vector<float> table_;
-};
-
 /// A place along a side of the page, moved away from its free ends: the last measured slopes there are noisy.
 double inside(double place_mm, double length_mm, bool gutter_first, bool gutter_last) {
   const double rim = std::min(rim_mm, 0.25 * length_mm);
   return std::clamp(place_mm, gutter_first ? 0 : rim, length_mm - (gutter_last ? 0 : rim));
-}
-
-/// The gains of a row of pixels, one channel.
-void interpolate_row(const LightGain& gain, const Image<float>& values, int y, double pixels_per_mm,
-                     std::vector<float>& row) {
-  const auto per_px = static_cast<float>(1 / (pixels_per_mm * gain.pitch_mm));
-  const float v = (static_cast<float>(y) + 0.5f) * per_px;
-  const int j = std::clamp(static_cast<int>(v), 0, values.height() - 2);
-  const float b = v - static_cast<float>(j);
-  for (std::size_t x = 0; x < row.size(); ++x) {
-    const float u = (static_cast<float>(x) + 0.5f) * per_px;
-    const int i = std::clamp(static_cast<int>(u), 0, values.width() - 2);
-    const float a = u - static_cast<float>(i);
-    const float upper = values(i, j) + a * (values(i + 1, j) - values(i, j));
-    const float lower = values(i, j + 1) + a * (values(i + 1, j + 1) - values(i, j + 1));
-    row[x] = upper + b * (lower - upper);
-  }
 }
 
 }  // namespace
@@ -220,28 +182,6 @@ LightGain PageLight::gain(std::size_t page, const PageFrame& frame) const {
     }
   });
   return gain;
-}
-
-void apply_gain(const LightGain& gain, Page& page) {
-  Picture& picture = page.picture;
-  const TransferCurve curve = TransferCurve::of(picture);
-  const std::vector<float> light = curve.table(picture.bit_depth());
-  const Encoder encode(curve, picture.bit_depth());
-  std::visit(
-      [&]<class T>(Image<T>& samples) {
-        parallel_rows(picture.height(), [&](int y) {
-          std::vector<float> row(static_cast<std::size_t>(picture.width()));
-          for (int c = 0; c < picture.channels; ++c) {
-            interpolate_row(gain, gain.values[static_cast<std::size_t>(c)], y, picture.pixels_per_mm, row);
-            for (int x = 0; x < picture.width(); ++x) {
-              if (std::isnan(page.scan_map.u(x, y))) continue;
-              T& sample = samples(x * picture.channels + c, y);
-              sample = static_cast<T>(encode(light[sample] * row[static_cast<std::size_t>(x)]) + 0.5f);
-            }
-          }
-        });
-      },
-      picture.samples);
 }
 
 }  // namespace pagesweep

@@ -10,6 +10,7 @@
 #include "pagesweep/base/enum_names.h"
 #include "pagesweep/data/page.h"
 #include "pagesweep/dewarping/lamp_light.h"
+#include "pagesweep/dewarping/light_gain.h"
 #include "pagesweep/dewarping/page_frame.h"
 #include "pagesweep/dewarping/paper_view.h"
 
@@ -21,12 +22,6 @@ enum class Shading {
   keep,  ///< left as the scan shows it
 };
 constexpr auto names_of(Shading) { return std::array<std::string_view, 2>{"even", "keep"}; }
-
-/// By how much the light of each spot of a page is to be multiplied to look as if it lay level on the table.
-struct LightGain {
-  double pitch_mm = 1;                 ///< of the grid, which begins at the page's corner
-  std::array<Image<float>, 3> values;  ///< red, green, blue
-};
 
 /// How paper lies in the light, page by page.
 class PageLight {
@@ -48,9 +43,5 @@ class PageLight {
   const Picture& scan_;
   ScanLight light_;
 };
-
-/// Multiplies the page's light, sample by sample through the picture's tone curve. What the scan does not show is left
-/// alone.
-void apply_gain(const LightGain& gain, Page& page);
 
 }  // namespace pagesweep

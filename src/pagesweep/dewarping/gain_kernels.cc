@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/dewarping/gain_kernels.h"
+
+#include <array>
+#include <cmath>
+
+// clang-format off
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pagesweep/dewarping/gain_kernels.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// clang-format on
+
+HWY_BEFORE_NAMESPACE();
+namespace pagesweep::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using Tag = hn::CappedTag<float, gain_row_step>;
+using Vec = hn::Vec<Tag>;
+
+template <std::size_t channels>
+void SpreadRow(std::span<const std::vector<float>> nodes, float nodes_per_px, std::span<const float> shown,
+               float* gains) {
+  const Tag d;
+  const hn::RebindToSigned<Tag> di;
+  const auto last = hn::Set(di, static_cast<std::int32_t>(nodes[0].size()) - 2);
+  for (std::size_t x = 0; x < shown.size(); x += hn::Lanes(d)) {
+    const Vec u = hn::Mul(hn::Iota(d, static_cast<float>(x) + 0.5f), hn::Set(d, nodes_per_px));
+    const auto i = hn::Min(hn::ConvertTo(di, u), last);
+    const Vec a = hn::Sub(u, hn::ConvertTo(d, i));
+    const auto hidden = hn::IsNaN(hn::LoadU(d, &shown[x]));
+    std::array<Vec, channels> gain;
+    for (std::size_t c = 0; c < channels; ++c) {
+      const Vec left = hn::GatherIndex(d, nodes[c].data(), i), right = hn::GatherIndex(d, nodes[c].data() + 1, i);
+      gain[c] = hn::IfThenElse(hidden, hn::Set(d, left_alone), hn::MulAdd(a, hn::Sub(right, left), left));
+    }
+    if constexpr (channels == 3)
+      hn::StoreInterleaved3(gain[0], gain[1], gain[2], d, gains + 3 * x);
+    else
+      hn::StoreU(gain[0], d, gains + x);
+  }
+}
+
+void SpreadGains(std::span<const std::vector<float>> nodes, float nodes_per_px, std::span<const float> shown,
+                 std::span<float> gains) {
+  nodes.size() == 3 ? SpreadRow<3>(nodes, nodes_per_px, shown, gains.data())
+                    : SpreadRow<1>(nodes, nodes_per_px, shown, gains.data());
+}
+
+template <class T>
+void MultiplyLight(const ToneTables& tones, std::span<const float> gains, std::span<T> samples) {
+  const Tag d;
+  const hn::RebindToSigned<Tag> di;
+  const hn::Rebind<T, Tag> dt;
+  const Vec cells = hn::Set(d, ToneTables::cells);
+  const auto last = hn::Set(di, ToneTables::cells - 1);
+  for (std::size_t k = 0; k < samples.size(); k += hn::Lanes(d)) {
+    const auto before = hn::PromoteTo(di, hn::LoadU(dt, &samples[k]));
+    const Vec gain = hn::LoadU(d, &gains[k]);
+    const Vec light = hn::Mul(hn::GatherIndex(d, tones.light.data(), before), gain);
+    const Vec root = hn::Sqrt(hn::Min(hn::Max(light, hn::Zero(d)), hn::Set(d, 1)));
+    const Vec place = hn::Mul(root, cells);
+    const auto cell = hn::Min(hn::ConvertTo(di, place), last);
+    const Vec low = hn::GatherIndex(d, tones.samples.data(), cell);
+    const Vec high = hn::GatherIndex(d, tones.samples.data() + 1, cell);
+    const Vec sample = hn::MulAdd(hn::Sub(place, hn::ConvertTo(d, cell)), hn::Sub(high, low), low);
+    const auto after = hn::ConvertTo(di, hn::Add(sample, hn::Set(d, 0.5f)));
+    const auto alone = hn::RebindMask(di, hn::Lt(gain, hn::Zero(d)));
+    hn::StoreU(hn::DemoteTo(dt, hn::IfThenElse(alone, before, after)), dt, &samples[k]);
+  }
+}
+
+void MultiplyLight8(const ToneTables& tones, std::span<const float> gains, std::span<std::uint8_t> samples) {
+  MultiplyLight(tones, gains, samples);
+}
+void MultiplyLight16(const ToneTables& tones, std::span<const float> gains, std::span<std::uint16_t> samples) {
+  MultiplyLight(tones, gains, samples);
+}
+
+}  // namespace
+}  // namespace pagesweep::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace pagesweep {
+
+HWY_EXPORT(SpreadGains);
+HWY_EXPORT(MultiplyLight8);
+HWY_EXPORT(MultiplyLight16);
+
+ToneTables::ToneTables(const TransferCurve& curve, int bit_depth) : light(curve.table(bit_depth)) {
+  const int white = (1 << bit_depth) - 1;
+  for (int k = 0; k <= cells; ++k)
+    samples.push_back(static_cast<float>(curve.sample(std::pow(double(k) / cells, 2)) * white));
+}
+
+void spread_gains(std::span<const std::vector<float>> nodes, float nodes_per_px, std::span<const float> shown,
+                  std::span<float> gains) {
+  HWY_DYNAMIC_DISPATCH(SpreadGains)(nodes, nodes_per_px, shown, gains);
+}
+
+void multiply_light(const ToneTables& tones, std::span<const float> gains, std::span<std::uint8_t> samples) {
+  HWY_DYNAMIC_DISPATCH(MultiplyLight8)(tones, gains, samples);
+}
+
+void multiply_light(const ToneTables& tones, std::span<const float> gains, std::span<std::uint16_t> samples) {
+  HWY_DYNAMIC_DISPATCH(MultiplyLight16)(tones, gains, samples);
+}
+
+}  // namespace pagesweep
+#endif
