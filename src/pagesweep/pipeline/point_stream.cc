@@ -125,15 +125,18 @@ void PointStream::go_on(const Times& seen, double until, Progress& progress) {
 }
 
 bool PointStream::step_on(Side& side, const TimeMap& times, Step from, double until) {
+  // What has no time comes at the end, where no time is too late.
+  const bool at_the_end = until == infinity;
+  const auto too_late = static_cast<float>(until);
   std::vector<std::uint8_t> rows(static_cast<std::size_t>(times.height()));
   parallel_rows(times.height(), [&](int y) {
-    bool any = false;
-    for (int x = 0; x < times.width(); ++x) {
-      // What has no time comes at the end, where no time is too late.
-      const bool steps_on = side.step(x, y) == from && (until == infinity || times.time(x, y) < until);
-      side.now(x, y) = steps_on;
-      if (steps_on) side.step(x, y) = static_cast<std::uint8_t>(from + 1);
-      any = any || steps_on;
+    const float* time = times.time.row(y).data();
+    std::uint8_t *step = side.step.row(y).data(), *now = side.now.row(y).data(), any = 0;
+    for (int x = 0; x < times.width(); ++x) {  // without branches: a whole picture is passed for a few pixels
+      const auto steps_on = static_cast<std::uint8_t>((step[x] == from) & (at_the_end | (time[x] < too_late)));
+      now[x] = steps_on;
+      step[x] = static_cast<std::uint8_t>(step[x] + steps_on);
+      any |= steps_on;
     }
     rows[static_cast<std::size_t>(y)] = any;
   });
@@ -203,19 +206,27 @@ void PointStream::fit_normals(double until) {
 }
 
 void PointStream::forget_changed(const Times& seen) {
-  constexpr int reach_px = 3;  // of what a pixel's way depends on
+  constexpr int reach_px = 3;                            // of what a pixel's way depends on
+  constexpr float little = 0.1f;                         // standard deviations: less is worth nothing
+  std::array<std::vector<std::vector<int>>, 2> changed;  // of each camera's rows
+  for (std::size_t c = 0; c < sides_.size(); ++c) {
+    const Side& side = sides_[c];
+    changed[c].resize(static_cast<std::size_t>(side.step.height()));
+    parallel_rows(side.step.height(), [&](int y) {
+      for (int x = 0; x < side.step.width(); ++x) {
+        const float change = std::abs(seen[c]->time(x, y) - side.taken(x, y));
+        if (side.step(x, y) != none && !(change < little * seen[c]->sigma(x, y)))
+          changed[c][static_cast<std::size_t>(y)].push_back(x);
+      }
+    });
+  }
   const MatchPair& pair = matching_.matches();
   for (std::size_t c = 0; c < sides_.size(); ++c) {
-    const Image<std::uint8_t> step = sides_[c].step;  // as it was before anything was forgotten
     const Correspondences& matches = c == 0 ? pair.from_first : pair.from_second;
-    for (int y = 0; y < step.height(); ++y)
-      for (int x = 0; x < step.width(); ++x) {
-        // Less than that of a standard deviation is worth nothing.
-        constexpr float little = 0.1f;
-        const float change = std::abs(seen[c]->time(x, y) - sides_[c].taken(x, y));
-        if (step(x, y) == none || change < little * seen[c]->sigma(x, y)) continue;
+    for (int y = 0; y < sides_[c].step.height(); ++y)
+      for (const int x : changed[c][static_cast<std::size_t>(y)]) {
         forget(sides_[c], x, y, reach_px);
-        if (step(x, y) > timed && std::isfinite(matches.u(x, y)))
+        if (std::isfinite(matches.u(x, y)))
           forget(sides_[1 - c], static_cast<int>(std::lround(matches.u(x, y))),
                  static_cast<int>(std::lround(matches.v(x, y))), reach_px);
       }
