@@ -175,5 +175,30 @@ TEST(Cover, WhatLiesOnThePaperIsMarkedAndThePaperGoesOnBelowIt) {
   }
 }
 
+TEST(Cover, AFingerIsNoPaperThoughAFewCellsLeadUpToIt) {
+  // 12 mm high at the margin, and a ramp 7 mm wide from the paper to its top, as fits across an edge make them.
+  const auto rise = [](double x, double y) {
+    if (x > 55 && std::abs(y - 10) < 9) return 12.0;
+    return x > 20 && std::abs(y - 10) < 3.5 ? 12 * (x - 20) / 35 : 0.0;
+  };
+  const auto height = [&](double x, double y) { return arch(x, y) + rise(x, y); };
+  const auto pages = fit_surface(measure({height, 50, 8}), {.layout = Layout::single});
+  ASSERT_EQ(pages.size(), 1u);
+  const PageSurface& page = pages[0];
+  int inside = 0, marked = 0;
+  for (int j = 0; j < page.rows(); ++j)
+    for (int i = 0; i < page.columns(); ++i) {
+      const Eigen::Vector3f p = page.measured(i, j);
+      if (std::isnan(arch(p.x(), p.y())) || (p.x() > 15 && std::abs(p.y() - 10) < 8)) {
+        inside += p.x() > 60 && p.x() < 80 && std::abs(p.y() - 10) < 6;
+        marked += p.x() > 60 && p.x() < 80 && std::abs(p.y() - 10) < 6 && page.status(i, j) == PixelStatus::covered;
+        continue;
+      }
+      EXPECT_NEAR(p.z(), arch(p.x(), p.y()), 0.3) << p.transpose();
+    }
+  EXPECT_GT(inside, 30);
+  EXPECT_GT(marked, 0.95 * inside);
+}
+
 }  // namespace
 }  // namespace pagesweep

@@ -117,10 +117,24 @@ class Pieces {
  public:
   Pieces(const HeightField& field, const Image<std::uint8_t>& measured, const Image<std::uint8_t>& bright,
          double step = step_mm)
-      : field_(field), measured_(measured), bright_(bright), step_mm_(step), label_(field.columns(), field.rows(), -1) {
-    for (int j = 0; j < field.rows(); ++j)
-      for (int i = 0; i < field.columns(); ++i)
-        if (label_(i, j) < 0 && is_inner(i, j)) grow(i, j);
+      : field_(field),
+        measured_(measured),
+        bright_(bright),
+        step_mm_(step),
+        inner_(field.columns(), field.rows(), 0),
+        label_(field.columns(), field.rows(), -1) {
+    parallel_rows(field.rows(), [&](int j) {
+      for (int i = 0; i < field.columns(); ++i) inner_(i, j) = is_inner(i, j);
+    });
+    // One or two cells that happen to lead from a finger to the paper do not make them one piece. (The table's noise
+    // may have holes all over: it stays one.)
+    Image<std::uint8_t> broad = cores_of(inner_);
+    for (std::size_t k = 0; k < broad.size(); ++k)
+      if (!bright_.data()[k]) broad.data()[k] = inner_.data()[k];
+    grow_all(broad);
+    for (int round = 0; round < 2; ++round) widen_pieces();
+    grow_all(inner_);
+    for (Piece& piece : pieces_) note_heights(piece);
   }
 
   /// \param times_smaller  than the largest bright piece another one may be
@@ -194,29 +208,70 @@ class Pieces {
     return whole;
   }
 
-  void grow(int i0, int j0) {
+  /// Cells whose eight neighbours are in the mask too.
+  static Image<std::uint8_t> cores_of(const Image<std::uint8_t>& mask) {
+    Image<std::uint8_t> cores(mask.width(), mask.height(), 0);
+    for (int j = 1; j + 1 < mask.height(); ++j)
+      for (int i = 1; i + 1 < mask.width(); ++i) {
+        cores(i, j) = 1;
+        for (int dj = -1; dj <= 1; ++dj)
+          for (int di = -1; di <= 1; ++di) cores(i, j) &= mask(i + di, j + dj);
+      }
+    return cores;
+  }
+
+  bool is_one_surface(int i, int j, int i2, int j2) const {
+    return bright_(i, j) == bright_(i2, j2) && joined(i, j, i2, j2);
+  }
+
+  /// Makes a piece of all that is connected through cells of `way` and has no piece yet.
+  void grow_all(const Image<std::uint8_t>& way) {
+    for (int j = 0; j < field_.rows(); ++j)
+      for (int i = 0; i < field_.columns(); ++i)
+        if (label_(i, j) < 0 && way(i, j)) grow(i, j, way);
+  }
+
+  void grow(int i0, int j0, const Image<std::uint8_t>& way) {
     const int number = static_cast<int>(pieces_.size());
     Piece piece;
     piece.bright = bright_(i0, j0) != 0;
     piece.cells.push_back(j0 * field_.columns() + i0);
     label_(i0, j0) = number;
-    std::vector<float> heights;
     for (std::size_t n = 0; n < piece.cells.size(); ++n) {
       const int i = piece.cells[n] % field_.columns(), j = piece.cells[n] / field_.columns();
-      heights.push_back(field_.z(i, j));
       for (const auto& [di, dj] : neighbours) {
         const int i2 = i + di, j2 = j + dj;
-        if (!measured_.contains(i2, j2) || label_(i2, j2) >= 0 || !is_inner(i2, j2)) continue;
-        if ((bright_(i2, j2) != 0) != piece.bright || !joined(i, j, i2, j2)) continue;
+        if (!way.contains(i2, j2) || !way(i2, j2) || label_(i2, j2) >= 0 || !is_one_surface(i, j, i2, j2)) continue;
         label_(i2, j2) = number;
         piece.cells.push_back(j2 * field_.columns() + i2);
       }
     }
+    pieces_.push_back(std::move(piece));
+  }
+
+  /// Gives the inner cells beside a piece to it.
+  void widen_pieces() {
+    const Image<int> before = label_;
+    for (int j = 0; j < field_.rows(); ++j)
+      for (int i = 0; i < field_.columns(); ++i) {
+        if (before(i, j) >= 0 || !inner_(i, j)) continue;
+        for (const auto& [di, dj] : neighbours) {
+          const int i2 = i + di, j2 = j + dj;
+          if (!before.contains(i2, j2) || before(i2, j2) < 0 || !is_one_surface(i2, j2, i, j)) continue;
+          label_(i, j) = before(i2, j2);
+          pieces_[static_cast<std::size_t>(label_(i, j))].cells.push_back(j * field_.columns() + i);
+          break;
+        }
+      }
+  }
+
+  void note_heights(Piece& piece) const {
+    std::vector<float> heights;
+    for (const int k : piece.cells) heights.push_back(field_.z.data()[k]);
     std::ranges::sort(heights);
     piece.lower_z = heights[heights.size() / 4];
     piece.middle_z = heights[heights.size() / 2];
     piece.upper_z = heights[heights.size() * 3 / 4];
-    pieces_.push_back(std::move(piece));
   }
 
   /// The largest bright piece and what is comparable to it, but not a level ground well below it.
@@ -284,7 +339,7 @@ class Pieces {
   }
 
   bool is_printed(const Piece& piece) const {
-    if (piece.borders == 0) return false;
+    if (piece.borders == 0 || step_up_to(piece) > step_mm_) return false;
     if (piece.rim_outside < 0.02) return true;
     return piece.drop_mm < edge_drop_mm && sides_framed(piece) < 2;
   }
@@ -321,6 +376,7 @@ class Pieces {
   const Image<std::uint8_t>& measured_;
   const Image<std::uint8_t>& bright_;
   double step_mm_;
+  Image<std::uint8_t> inner_;
   Image<int> label_;
   std::vector<Piece> pieces_;
 };
