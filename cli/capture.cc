@@ -2,17 +2,13 @@
 // pagesweep capture: a sweep from live cameras, recorded.
 #include <fmt/format.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
 #include "cli/exit_code.h"
 #include "cli/live_input.h"
-#include "cli/option_visitor.h"
-#include "cli/output_folder.h"
-#include "pagesweep/io/image_file.h"
+#include "cli/live_recording.h"
 #include "pagesweep/io/rig_file.h"
-#include "pagesweep/live/record_capture.h"
 
 namespace pagesweep::cli {
 namespace {
@@ -36,48 +32,32 @@ nlohmann::ordered_json to_json(const LiveStatus& status) {
   return cameras;
 }
 
-/// Without a picture, frames alone can still be measured.
-std::string take_picture(ScanPictureSource& scanner, Capture& capture) {
-  try {
-    const Picture picture = scanner.finish(std::chrono::milliseconds(2000));
-    write_picture(capture.folder / "scan.tif", picture);
-    capture.scan = "scan.tif";
-    return {};
-  } catch (const Error& error) {
-    return error.what();
-  }
-}
-
 void run(const Arguments& arguments) {
   const Rig rig = read_rig(arguments.rig);
-  if (std::filesystem::exists(arguments.output / "capture.json"))
-    throw pagesweep::cannot_write(arguments.output,
-                                  "there is a capture already, which is never overwritten: name a new folder");
-  OutputFolder output(arguments.output, "capture.json");
+  LiveRecording recording(arguments.output);
   LiveView view(arguments.common.quiet);
   OpenedRig opened = open(arguments.input, rig, view);
-  CaptureRecorder recorder(output.path(), opened.source->sequences());
-  RecordedSource source(*opened.source, recorder, true);
+  FrameSource& source = recording.begin(opened, true);
   while (source.next()) {
   }
+  view.clear();
+  const std::string why_ended = join_problems(opened.source->ended_early(), recording.trouble());
+  if (!why_ended.empty()) view.warn(why_ended);
+  LatePicture late_picture(opened.scanner.get());
+  const Picture* picture = why_ended.empty() ? late_picture.get() : nullptr;
   const LiveStatus status = opened.source->status();
-  Capture capture = describe_capture(output.path(), recorder.finish(), *opened.source);
-  std::string problem = opened.source->ended_early().empty() ? recorder.trouble() : opened.source->ended_early();
-  if (opened.scanner && problem.empty()) problem = take_picture(*opened.scanner, capture);
-  if (!problem.empty()) capture.notes = "partial: " + problem;
-  write_rig(output.path() / "rig.json", rig);
-  write_devices(output.path() / "devices.json", opened.devices);
-  write_capture(capture);
-  output.finish();
+  const Capture capture =
+      recording.finish(rig, picture, join_problems(opened.source->ended_early(), late_picture.problem()));
   view.finish(status);
   print_answer(arguments.common,
-               {{"capture", output.path().string()},
+               {{"capture", recording.path().string()},
                 {"frames", capture.sequences[0].count},
                 {"cameras", to_json(status)},
-                {"partial", problem}},
-               fmt::format("{}: {} cameras, {} triggers{}\n", output.path().string(), capture.sequences.size(),
-                           capture.sequences[0].count, problem.empty() ? "" : "; partial: " + problem));
-  if (!problem.empty()) throw pagesweep::cannot_read(output.path(), "the capture is partial: " + problem);
+                {"partial", !capture.notes.empty()},
+                {"notes", capture.notes}},
+               fmt::format("{}: {} cameras, {} triggers{}\n", recording.path().string(), capture.sequences.size(),
+                           capture.sequences[0].count, capture.notes.empty() ? "" : "; " + capture.notes));
+  if (!capture.notes.empty()) throw pagesweep::cannot_read(recording.path(), "the capture is " + capture.notes);
 }
 
 }  // namespace

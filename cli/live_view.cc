@@ -5,17 +5,17 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <limits>
 
 #include "cli/interrupt.h"
-#include "pagesweep/data/time_map.h"
+#include "pagesweep/live/letter_relief.h"
 
 namespace pagesweep::cli {
 namespace {
 
 constexpr int bar_length = 40;
+constexpr int relief_columns = 56, relief_rows = 16;
+constexpr auto between_reliefs = std::chrono::milliseconds(300);
 
 std::string_view describe(SweepWatch::State state) {
   switch (state) {
@@ -43,18 +43,17 @@ std::string describe(const LiveStatus::Camera& camera) {
 
 LiveView::LiveView(bool quiet) : quiet_(quiet), terminal_(!quiet && isatty(STDERR_FILENO) != 0) {}
 
-LiveView::~LiveView() { erase(); }
+LiveView::~LiveView() { clear(); }
 
-void LiveView::erase() {
+void LiveView::clear() {
   if (terminal_ && lines_drawn_ > 0) fmt::print(stderr, "\x1b[{}F\x1b[J", lines_drawn_);
   lines_drawn_ = 0;
 }
 
-void LiveView::warn(const std::vector<std::string>& remarks) {
-  for (const std::string& remark : remarks) {
-    remarks_.push_back(remark);
-    if (!quiet_) fmt::print(stderr, "  {}\n", remark);
-  }
+void LiveView::warn(const std::string& remark) {
+  clear();
+  remarks_.push_back(remark);
+  if (!quiet_) fmt::print(stderr, "  {}\n", remark);
 }
 
 void LiveView::draw(const LiveStatus& status) {
@@ -76,8 +75,8 @@ void LiveView::draw(const LiveStatus& status) {
 
 void LiveView::show(const LiveStatus& status) {
   throw_if_interrupted();
-  erase();
-  warn(status.remarks);
+  clear();
+  for (const std::string& remark : status.remarks) warn(remark);
   if (quiet_) return;
   const auto now = std::chrono::steady_clock::now();
   if (terminal_) {
@@ -95,34 +94,15 @@ void LiveView::show(const LiveStatus& status) {
 }
 
 void LiveView::show(const PointMap& points) {
-  constexpr int columns = 56, rows = 16;
-  constexpr std::string_view letters = ".:-=+*#%@";
   const auto now = std::chrono::steady_clock::now();
-  if (!terminal_ || now - last_relief_ < std::chrono::milliseconds(300)) return;
+  if (!terminal_ || now - last_relief_ < between_reliefs) return;
   last_relief_ = now;
-  Image<float> heights(columns, rows, not_a_number);
-  float low = std::numeric_limits<float>::infinity(), high = -low;
-  for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < columns; ++x) {
-      const int u = (2 * x + 1) * points.width() / (2 * columns), v = (2 * y + 1) * points.height() / (2 * rows);
-      if (points.status(u, v) != PixelStatus::ok) continue;
-      const float z = heights(x, y) = points.z(u, v);
-      low = std::min(low, z), high = std::max(high, z);
-    }
-  const float step = std::max(high - low, 5.0F) / static_cast<float>(letters.size());  // [mm] a flat sheet stays even
-  relief_.assign(rows, std::string(columns, ' '));
-  for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < columns; ++x)
-      if (std::isfinite(heights(x, y))) {
-        const auto level = static_cast<std::size_t>((heights(x, y) - low) / step);
-        relief_[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] =
-            letters[std::min(level, letters.size() - 1)];
-      }
+  relief_ = letter_relief(points, relief_columns, relief_rows);
 }
 
 void LiveView::finish(const LiveStatus& status) {
-  erase();
-  warn(status.remarks);
+  clear();
+  for (const std::string& remark : status.remarks) warn(remark);
   if (quiet_) return;
   for (const auto& camera : status.cameras) fmt::print(stderr, "{}\n", cli::describe(camera));
 }

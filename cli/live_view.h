@@ -20,15 +20,17 @@ class LiveView {
   void show(const LiveStatus& status);
   /// The surface so far, as one camera sees it.
   void show(const PointMap& points);
-  /// Ends the picture, and says how it went.
+  /// Takes the picture off the terminal, for others to write.
+  void clear();
+  /// Tells something at once.
+  void warn(const std::string& remark);
+  /// Says how it went.
   void finish(const LiveStatus& status);
   /// Everything that the operator was warned of.
   const std::vector<std::string>& remarks() const { return remarks_; }
 
  private:
-  void warn(const std::vector<std::string>& remarks);
   void draw(const LiveStatus& status);
-  void erase();
 
   bool quiet_, terminal_;
   int lines_drawn_ = 0;

@@ -65,6 +65,9 @@ void add_figures(std::vector<Figure>& figures, const ExposureAdvice& advice, con
   figures.push_back({camera, "light_factor",
                      "the light, by exposure or gain, that would use the range well, over that which there was",
                      advice.light_factor, "", ""});
+  figures.push_back({camera, "speed_factor",
+                     "the light's speed, in mm a frame, that would suit time values, over that which there was",
+                     advice.speed_factor, "", ""});
 }
 
 std::vector<CameraReport> cameras_of(const RunResult& result) {
@@ -104,6 +107,7 @@ ReportInputs inputs_of(const RunResult& result, std::span<const PageQuality> qua
   }
   if (const auto& sweep = result.measurement.sweep)
     for (Figure& figure : figures_of(*sweep)) inputs.figures.push_back(std::move(figure));
+  inputs.figures.insert(inputs.figures.end(), result.figures.begin(), result.figures.end());
   inputs.surfaces = result.surfaces;
   inputs.pages = result.pages;
   inputs.quality = quality;
@@ -135,6 +139,27 @@ void add_measuring_options(std::vector<OptionValue>& values, const ScanOptions& 
 void add_flattening_options(std::vector<OptionValue>& values, const ScanOptions& options) {
   add_options(values, "surfacing", options.surface);
   add_options(values, "dewarping", options.dewarp);
+}
+
+void write_scan(OutputFolder& output, const ScanResult& scan, ConsoleProgress& progress, const CommonOptions& options) {
+  progress.begin("writing the pages");
+  output.begin();
+  write_measurement(output.path(), scan.scan.measurement);
+  if (scan.picture)
+    write_pages(output.path(), scan.scan.pages, scan.scan.surfaces, scan.files,
+                {scan.title, "pagesweep " PAGESWEEP_VERSION});
+  RunResult result{.title = scan.title,
+                   .sequences = scan.sequences,
+                   .measurement = scan.scan.measurement,
+                   .surfaces = scan.scan.surfaces,
+                   .pages = scan.scan.pages,
+                   .scan = scan.picture,
+                   .kernel = scan.options.dewarp.resampling.kernel,
+                   .fail_on = scan.fail_on,
+                   .figures = scan.figures};
+  add_measuring_options(result.options, scan.options);
+  add_flattening_options(result.options, scan.options);
+  finish_result(output, result, progress, options);
 }
 
 void finish_result(OutputFolder& output, const RunResult& result, ConsoleProgress& progress,

@@ -10,6 +10,7 @@
 #include "cli/command.h"
 #include "cli/console_progress.h"
 #include "cli/output_folder.h"
+#include "pagesweep/pipeline/results.h"
 #include "pagesweep/pipeline/scan_page.h"
 #include "pagesweep/report/report.h"
 
@@ -39,11 +40,28 @@ struct RunResult {
   ResampleKernel kernel = ResampleKernel::lanczos3;  ///< that pages were made with
   FailOn fail_on = FailOn::never;
   std::vector<OptionValue> options = {};
+  std::vector<Figure> figures = {};  ///< more than the measurement tells
 };
 
 /// The options of the measuring stations, and those of the flattening ones, as they were used.
 void add_measuring_options(std::vector<OptionValue>& values, const ScanOptions& options);
 void add_flattening_options(std::vector<OptionValue>& values, const ScanOptions& options);
+
+/// A whole scan that is done, of a capture or of live cameras.
+struct ScanResult {
+  std::string title;
+  const std::vector<Sequence>& sequences;
+  const Scan& scan;
+  const Picture* picture = nullptr;  ///< null: none came, and there are no pages
+  const ScanOptions& options;
+  const PageFileOptions& files;
+  FailOn fail_on = FailOn::never;
+  std::vector<Figure> figures = {};  ///< more than the measurement tells
+};
+
+/// Writes all that a scan has found, and the report.
+void write_scan(OutputFolder& output, const ScanResult& result, ConsoleProgress& progress,
+                const CommonOptions& options);
 
 /// Writes the report, which completes the output folder, and answers with what it says.
 void finish_result(OutputFolder& output, const RunResult& result, ConsoleProgress& progress,

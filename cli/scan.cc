@@ -11,7 +11,6 @@
 #include "cli/scan_live.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/io/image_file.h"
-#include "pagesweep/pipeline/results.h"
 
 namespace pagesweep::cli {
 namespace {
@@ -30,13 +29,13 @@ struct Arguments {
 
 void run_live(const Arguments& arguments) {
   scan_live({arguments.common, arguments.cameras, arguments.input.rig, arguments.input.picture, arguments.record,
-             arguments.output, arguments.options, arguments.files});
+             arguments.output, arguments.options, arguments.files, arguments.quality});
 }
 
 void run(const Arguments& arguments) {
+  check(arguments.files);
   if (arguments.live) return run_live(arguments);
   if (arguments.input.capture.empty()) throw CLI::ValidationError("CAPTURE", "name one, or take a sweep with --live");
-  check(arguments.files);
   const ThreadLimit limit(arguments.common.threads);
   ConsoleProgress progress(arguments.common.quiet);
   OutputFolder output(arguments.output, "report.json");
@@ -49,22 +48,15 @@ void run(const Arguments& arguments) {
   };
   const Scan scan = scan_page(*opened.frames, ScanSource(read), opened.rig, arguments.options, progress);
 
-  progress.begin("writing the pages");
-  output.begin();
-  write_measurement(output.path(), scan.measurement);
-  write_pages(output.path(), scan.pages, scan.surfaces, arguments.files,
-              {title_of(opened.capture), "pagesweep " PAGESWEEP_VERSION});
-  RunResult result{.title = title_of(opened.capture),
-                   .sequences = opened.frames->sequences(),
-                   .measurement = scan.measurement,
-                   .surfaces = scan.surfaces,
-                   .pages = scan.pages,
-                   .scan = &read(),
-                   .kernel = arguments.options.dewarp.resampling.kernel,
-                   .fail_on = arguments.quality.fail_on};
-  add_measuring_options(result.options, arguments.options);
-  add_flattening_options(result.options, arguments.options);
-  finish_result(output, result, progress, arguments.common);
+  write_scan(output,
+             {.title = title_of(opened.capture),
+              .sequences = opened.frames->sequences(),
+              .scan = scan,
+              .picture = &read(),
+              .options = arguments.options,
+              .files = arguments.files,
+              .fail_on = arguments.quality.fail_on},
+             progress, arguments.common);
 }
 
 }  // namespace

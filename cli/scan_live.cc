@@ -4,22 +4,19 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <exception>
 #include <optional>
 
 #include "cli/console_progress.h"
+#include "cli/live_recording.h"
 #include "cli/live_view.h"
 #include "cli/output_folder.h"
-#include "cli/result_output.h"
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
-#include "pagesweep/io/image_file.h"
 #include "pagesweep/io/rig_file.h"
-#include "pagesweep/live/record_capture.h"
 
 namespace pagesweep::cli {
 namespace {
-
-constexpr auto longest_wait_for_picture = std::chrono::milliseconds(2000);
 
 /// Steps are told when the sweep is over: before that, LiveView has the screen.
 class QuietSweep : public Progress {
@@ -40,147 +37,170 @@ class QuietSweep : public Progress {
   bool is_over_ = false;
 };
 
-/// Tells when the last frame had come.
-class TimedSource : public FrameSource {
+/// Tells why a sweep ended, if it ended early, as soon as it has.
+class WatchedSource : public FrameSource {
  public:
-  TimedSource(FrameSource& source, QuietSweep& progress) : source_(source), progress_(progress) {}
+  WatchedSource(FrameSource& source, const LiveSource& live, LiveView& view, QuietSweep& progress)
+      : source_(source), live_(live), view_(view), progress_(progress) {}
   const std::vector<Sequence>& sequences() const override { return source_.sequences(); }
   std::optional<FrameSet> next() override {
     auto set = source_.next();
-    if (set) last_frame_ = Clock::now();
-    if (!set) progress_.end_sweep();
+    has_begun_ |= set.has_value();
+    if (set) return set;
+    view_.clear();
+    if (!live_.ended_early().empty()) progress_.warn("partial: " + live_.ended_early());
+    progress_.end_sweep();
     return set;
   }
-  double seconds_since_last_frame() const { return std::chrono::duration<double>(Clock::now() - last_frame_).count(); }
+  bool has_begun() const { return has_begun_; }
+  double seconds_since_last_frame() const {
+    return std::chrono::duration<double>(Clock::now() - live_.last_arrival()).count();
+  }
 
  private:
   FrameSource& source_;
+  const LiveSource& live_;
+  LiveView& view_;
   QuietSweep& progress_;
-  Clock::time_point last_frame_ = Clock::now();
+  bool has_begun_ = false;
 };
 
-/// The scanner's picture, when it is asked for.
-class LatePicture {
- public:
-  LatePicture(ScanPictureSource* scanner, const std::filesystem::path& file) : scanner_(scanner), file_(file) {}
-
-  /// \return null if none comes, see problem()
-  const Picture* get() {
-    if (picture_ || !problem_.empty()) return picture_ ? &*picture_ : nullptr;
-    try {
-      picture_ = scanner_ ? scanner_->finish(longest_wait_for_picture) : read_picture(file_);
-    } catch (const Error& error) {
-      problem_ = error.what();
-    }
-    return picture_ ? &*picture_ : nullptr;
-  }
-  const std::string& problem() const { return problem_; }
-
- private:
-  ScanPictureSource* scanner_;
-  const std::filesystem::path& file_;
-  std::optional<Picture> picture_;
-  std::string problem_;
+/// When what was there [s] after the last frame had come from the network.
+struct Readiness {
+  std::optional<double> without_scan, scan;  ///< nothing if the points do not need the scan
+  double points = 0;
 };
 
-void finish_recording(const LiveScan& scan, CaptureRecorder& recorder, const OpenedRig& opened, const Rig& rig,
-                      const Picture* picture) {
-  Capture capture = describe_capture(scan.record, recorder.finish(), *opened.source);
-  if (picture) {
-    write_picture(scan.record / "scan.tif", *picture);
-    capture.scan = "scan.tif";
+/// Points, with what the scan tells of the print, if it comes.
+Measurement measure(WatchedSource& source, LatePicture& late_picture, const Rig& rig, const ScanOptions& options,
+                    Progress& progress, Readiness& ready) {
+  std::optional<Picture> none;  // of the scan's size: whatever is looked up in it tells nothing
+  const ScanSource scan = [&]() -> const Picture& {
+    if (!ready.without_scan) ready.without_scan = source.seconds_since_last_frame();
+    const Picture* picture = late_picture.get();
+    if (!ready.scan) ready.scan = source.seconds_since_last_frame();
+    if (picture) return *picture;
+    if (!none) none = make_picture(rig.scanner->width(), rig.scanner->height(), 1, 8);
+    return *none;
+  };
+  Measurement measurement = reconstruct(source, rig, options, progress, scan);
+  ready.points = source.seconds_since_last_frame();
+  return measurement;
+}
+
+/// Pages, if some are found. What was measured stays either way: the sweep cannot be done again.
+/// \return why there are none
+std::exception_ptr flatten(Scan& scan, const Picture& picture, const Rig& rig, const ScanOptions& options,
+                           Progress& progress) {
+  try {
+    scan = pagesweep::flatten(std::move(scan.measurement), picture, rig, options, progress);
+    return nullptr;
+  } catch (const Error&) {
+    return std::current_exception();
   }
-  const std::string& problem = opened.source->ended_early().empty() ? recorder.trouble() : opened.source->ended_early();
-  if (!problem.empty()) capture.notes = "partial: " + problem;
-  write_rig(scan.record / "rig.json", rig);
-  write_devices(scan.record / "devices.json", opened.devices);
-  write_capture(capture);
 }
 
-/// What makes the result a partial one; empty: nothing.
-std::string problem_of(const LiveSource& live, const LatePicture& picture, const CaptureRecorder* recorder) {
-  std::string problem = live.ended_early();
-  for (const std::string& other : {picture.problem(), recorder ? recorder->trouble() : std::string()})
-    if (!other.empty()) problem += (problem.empty() ? "" : "; ") + other;
-  return problem;
+void tell(const Readiness& ready) {
+  if (ready.without_scan)
+    fmt::print(
+        stderr,
+        "after the last frame: {:.2f} s to the points without the scan's help, {:.2f} s to the scan, {:.2f} s to "
+        "the finished points\n",
+        *ready.without_scan, *ready.scan, ready.points);
+  else
+    fmt::print(stderr, "after the last frame: {:.2f} s to the finished points\n", ready.points);
 }
 
-void warn(const std::string& problem, const LiveView& view, const LiveSource& live, ConsoleProgress& console) {
-  if (!problem.empty()) console.warn("partial: " + problem);
+std::vector<Figure> figures_of(const Readiness& ready, const LiveStatus& status) {
+  std::vector<Figure> figures;
+  if (ready.without_scan) {
+    figures.push_back({"live", "points_without_scan_after",
+                       "from the last frame to the points without the scan's help, which have no normals yet",
+                       *ready.without_scan, "s", ""});
+    figures.push_back({"live", "scan_after", "from the last frame to the scanner's picture", *ready.scan, "s", ""});
+  }
+  figures.push_back({"live", "points_after", "from the last frame to the finished points", ready.points, "s", ""});
+  for (const auto& camera : status.cameras) {
+    const auto add = [&](const char* name, const char* what, std::int64_t count) {
+      figures.push_back({camera.name, name, what, static_cast<double>(count), "frames", ""});
+    };
+    add("frames_received", "frames that came whole", camera.counts.received);
+    add("frames_damaged", "frames that lost packets on their way and were not used", camera.counts.damaged);
+    add("frames_lost", "frames of which nothing came, by the camera's own count", camera.counts.lost);
+    add("frames_unpaired", "whole frames whose trigger no other camera saw; used all the same", camera.counts.unpaired);
+    add("frames_late", "whole frames that came after their turn and were not used", camera.counts.late);
+  }
+  return figures;
+}
+
+void warn(const LiveView& view, const LiveStatus& status, ConsoleProgress& console) {
   for (const std::string& remark : view.remarks()) console.warn(remark);
-  for (const auto& camera : live.status().cameras)
-    if (camera.counts.damaged + camera.counts.lost + camera.counts.late > 0) console.warn(describe(camera));
+  for (const auto& camera : status.cameras) {
+    const FrameCounts& counts = camera.counts;
+    if (counts.damaged + counts.lost + counts.unpaired + counts.late > 0) console.warn(describe(camera));
+  }
 }
 
-void write_result(OutputFolder& output, const LiveScan& arguments, const LiveSource& live, const Scan& scan,
-                  const Picture* picture, ConsoleProgress& console) {
-  console.begin("writing the pages");
-  output.begin();
-  write_measurement(output.path(), scan.measurement);
-  if (picture) write_pages(output.path(), scan.pages, scan.surfaces, arguments.files);
-  RunResult result{.title = arguments.output.filename().string(),
-                   .sequences = live.sequences(),
-                   .measurement = scan.measurement,
-                   .surfaces = scan.surfaces,
-                   .pages = scan.pages,
-                   .scan = picture};
-  add_measuring_options(result.options, arguments.options);
-  add_flattening_options(result.options, arguments.options);
-  finish_result(output, result, console, arguments.common);
+void check(const LiveScan& arguments, const Rig& rig) {
+  if (arguments.input.scanner.empty() && arguments.picture.empty())
+    throw CLI::ValidationError("--scanner",
+                               "live cameras need it, or --picture, for there would be nothing to flatten");
+  if (!rig.scanner)
+    throw pagesweep::bad_input(arguments.rig, "scanner", "it is missing, and without it no picture can be flattened");
 }
 
 }  // namespace
 
 void scan_live(const LiveScan& arguments) {
   if (arguments.rig.empty()) throw CLI::ValidationError("--rig", "live cameras need it");
-  if (arguments.input.scanner.empty() && arguments.picture.empty())
-    throw CLI::ValidationError("--scanner",
-                               "live cameras need it, or --picture, for there would be nothing to flatten");
+  const Rig rig = read_rig(arguments.rig);
+  check(arguments, rig);
   const ThreadLimit limit(arguments.common.threads);
   ConsoleProgress console(arguments.common.quiet);
   QuietSweep progress(console);
-  const Rig rig = read_rig(arguments.rig);
   OutputFolder output(arguments.output, "report.json");
-  std::optional<OutputFolder> recording;
-  if (!arguments.record.empty()) recording.emplace(arguments.record, "capture.json");
+  std::optional<LiveRecording> recording;
+  if (!arguments.record.empty()) recording.emplace(arguments.record);
   LiveView view(arguments.common.quiet);
   OpenedRig opened = open(arguments.input, rig, view);
-  LiveSource& live = *opened.source;
-  std::optional<CaptureRecorder> recorder;
-  std::optional<RecordedSource> recorded;
-  if (recording) recorded.emplace(live, recorder.emplace(recording->path(), live.sequences()), false);
-  FrameSource& frames = recorded ? static_cast<FrameSource&>(*recorded) : live;
-
-  TimedSource source(frames, progress);
+  const LiveSource& live = *opened.source;
+  WatchedSource source(recording ? recording->begin(opened, false) : *opened.source, live, view, progress);
   LatePicture late_picture(opened.scanner.get(), arguments.picture);
-  std::optional<double> points_after_s;
-  std::optional<Picture> none;  // of the scan's size: whatever is looked up in it tells nothing
-  const ScanSource picture_of = [&]() -> const Picture& {
-    if (!points_after_s) points_after_s = source.seconds_since_last_frame();
-    if (const Picture* picture = late_picture.get()) return *picture;
-    if (!none) none = make_picture(rig.scanner->width(), rig.scanner->height(), 1, 8);
-    return *none;
-  };
   ScanOptions options = arguments.options;
   options.on_points = [&view](const PointMap& points) { view.show(points); };
+
+  Readiness ready;
   Scan scan;
-  scan.measurement = reconstruct(source, rig, options, progress, rig.scanner ? picture_of : ScanSource());
-  if (!points_after_s) points_after_s = source.seconds_since_last_frame();
-  const Picture* picture = rig.scanner ? late_picture.get() : nullptr;
-  if (picture) scan = flatten(std::move(scan.measurement), *picture, rig, options, progress);
-
-  view.finish(live.status());
-  const std::string problem = problem_of(live, late_picture, recorder ? &*recorder : nullptr);
-  warn(problem, view, live, console);
-  if (!arguments.common.quiet)
-    fmt::print(stderr, "points were finished {:.2f} s after the last frame\n", *points_after_s);
-
-  write_result(output, arguments, live, scan, picture, console);
-  if (recorder) {
-    finish_recording(arguments, *recorder, opened, rig, picture);
-    recording->finish();
+  try {
+    scan.measurement = measure(source, late_picture, rig, options, progress, ready);
+  } catch (const Error&) {
+    if (recording && source.has_begun()) recording->finish(rig, late_picture.get(), live.ended_early());
+    throw;
   }
+  const LiveStatus status = live.status();
+  view.finish(status);
+  if (!arguments.common.quiet) tell(ready);
+  const Picture* picture = late_picture.get();
+  const std::string problem = join_problems(live.ended_early(), late_picture.problem());
+  if (recording) recording->finish(rig, picture, problem);
+  if (!late_picture.problem().empty()) console.warn("partial: " + late_picture.problem());
+  const std::string not_recorded = recording ? recording->trouble() : "";
+  if (!not_recorded.empty()) console.warn("the recording is partial: " + not_recorded);
+  const std::exception_ptr no_pages = picture ? flatten(scan, *picture, rig, options, progress) : nullptr;
+  warn(view, status, console);
+  write_scan(output,
+             {.title = arguments.output.filename().string(),
+              .sequences = live.sequences(),
+              .scan = scan,
+              .picture = picture,
+              .options = options,
+              .files = arguments.files,
+              .fail_on = arguments.quality.fail_on,
+              .figures = figures_of(ready, status)},
+             console, arguments.common);
   if (!problem.empty()) throw pagesweep::cannot_read(arguments.output, "the result is partial: " + problem);
+  if (no_pages) std::rethrow_exception(no_pages);
+  if (!not_recorded.empty()) throw pagesweep::cannot_write(recording->path(), "it is partial: " + not_recorded);
 }
 
 }  // namespace pagesweep::cli

@@ -5,6 +5,7 @@
 
 #include "cli/command.h"
 #include "cli/live_input.h"
+#include "cli/result_output.h"
 #include "pagesweep/io/result_files.h"
 #include "pagesweep/pipeline/results.h"
 #include "pagesweep/pipeline/scan_page.h"
@@ -18,6 +19,7 @@ struct LiveScan {
   std::filesystem::path rig, picture, record, output;  ///< picture, record: may be empty
   ScanOptions options;
   PageFileOptions files;
+  QualityArguments quality;
 };
 
 /// Measures a sweep while it goes on, and flattens the pages when it has ended. What was measured is written even if a

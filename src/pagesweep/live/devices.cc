@@ -63,6 +63,7 @@ nlohmann::ordered_json to_json(const DeviceSettings& settings) {
   if (settings.packet_size > 0) json["packet_size"] = settings.packet_size;
   json["dark_level"] = settings.dark_level;
   if (settings.is_reversed) json["reversed"] = true;
+  if (settings.rows_a_buffer != DeviceSettings().rows_a_buffer) json["rows_a_buffer"] = settings.rows_a_buffer;
   return json;
 }
 

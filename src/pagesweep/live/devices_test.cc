@@ -25,6 +25,8 @@ TEST(Devices, AreReadAsTheyWereWritten) {
   settings.trigger = TriggerMode::software;
   settings.packet_size = 8192;
   settings.dark_level = 2.5;
+  settings.frame_rate = 12.5, settings.gain = 3;
+  settings.is_reversed = true, settings.rows_a_buffer = 77;
   const auto file = std::filesystem::path(::testing::TempDir()) / "written.json";
   write_devices(file, devices);
   const DeviceSettings read = read_devices(file).of("cam1");
@@ -35,6 +37,10 @@ TEST(Devices, AreReadAsTheyWereWritten) {
   EXPECT_EQ(read.packet_size, 8192);
   EXPECT_EQ(read.dark_level, 2.5);
   EXPECT_FALSE(read.black_level);
+  EXPECT_EQ(read.frame_rate, 12.5);
+  EXPECT_EQ(read.gain, 3);
+  EXPECT_TRUE(read.is_reversed);
+  EXPECT_EQ(read.rows_a_buffer, 77);
 }
 
 TEST(Devices, ACameraThatIsNotNamedHasDefaults) { EXPECT_EQ(Devices().of("cam9").trigger, TriggerMode::hardware); }

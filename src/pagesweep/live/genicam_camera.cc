@@ -18,9 +18,10 @@
 namespace pagesweep {
 namespace {
 
-constexpr int buffers = 64;         ///< over half a second at 100 frames a second
-constexpr int usual_packet = 1500;  ///< [bytes] what every network carries
-constexpr int jumbo_packet = 9000;  ///< [bytes] what networks for cameras carry
+constexpr int buffers = 64;                ///< over half a second at 100 frames a second
+constexpr int usual_packet = 1500;         ///< [bytes] what every network carries
+constexpr int jumbo_packet = 9000;         ///< [bytes] what networks for cameras carry
+constexpr double largest_rounding = 0.02;  ///< of an exposure, not worth a word
 constexpr unsigned frame_retention_us = 100'000;
 constexpr unsigned packet_timeout_us = 20'000;
 
@@ -77,6 +78,7 @@ struct GenicamCamera::State {
   void require_control();
   void set_region();
   void set_values();
+  void read_exposure();
   void set_trigger();
   void set_packet_size();
   void make_stream();
@@ -98,9 +100,6 @@ void GenicamCamera::State::open(const std::string& id) {
 void GenicamCamera::State::require_control() {
   ArvDevice* device = arv_camera_get_device(camera.get());
   if (!ARV_IS_GV_DEVICE(device) || arv_gv_device_is_controller(ARV_GV_DEVICE(device))) return;
-  GError* failure = nullptr;
-  if (arv_gv_device_take_control(ARV_GV_DEVICE(device), &failure)) return;
-  g_clear_error(&failure);
   throw Error(
       ErrorKind::cannot_read,
       fmt::format("{}: another program has the camera: end that program; after a crash the camera is free again "
@@ -144,6 +143,21 @@ void GenicamCamera::State::set_values() {
   set(settings.black_level, "black level", arv_camera_is_black_level_available, arv_camera_set_black_level);
   if (settings.trigger == TriggerMode::free_running)
     set(settings.frame_rate, "frame rate", arv_camera_is_frame_rate_available, arv_camera_set_frame_rate);
+}
+
+/// As the camera has it, whether it was set or not.
+void GenicamCamera::State::read_exposure() {
+  GError* ignored = nullptr;  // a camera that does not tell it can be used all the same
+  const double exposure_us = arv_camera_is_exposure_time_available(camera.get(), nullptr)
+                                 ? arv_camera_get_exposure_time(camera.get(), &ignored)
+                                 : 0;
+  const bool is_known = !ignored && exposure_us > 0;
+  g_clear_error(&ignored);
+  if (!is_known) return;
+  if (settings.exposure_us && std::abs(exposure_us - *settings.exposure_us) > largest_rounding * exposure_us)
+    remarks.push_back(fmt::format("{}: its exposure is {:.6g} us instead of the {:.6g} us that were asked for", name,
+                                  exposure_us, *settings.exposure_us));
+  settings.exposure_us = exposure_us;
 }
 
 void GenicamCamera::State::set_trigger() {
@@ -201,6 +215,7 @@ GenicamCamera::GenicamCamera(std::string name, const std::string& id, const Devi
   state_->require_control();
   state_->set_region();
   state_->set_values();
+  state_->read_exposure();
   state_->set_trigger();
   state_->set_packet_size();
   state_->ask("it cannot stream continuously", [&](GError** e) {

@@ -103,6 +103,7 @@ class Feed {
 struct Instant {
   FrameSet set;
   std::vector<Timestamp> stamps;
+  Clock::time_point arrival;  ///< of its last frame
 };
 
 bool is_whole(const Instant& instant) {
@@ -124,7 +125,7 @@ struct LiveSource::State {
   std::optional<TriggerTimes> times;
   std::deque<Instant> ready;  ///< before the sweep: the frames that go before it
   std::vector<Timestamp> stamps;
-  Clock::time_point started, last_status, sweep_begun;
+  Clock::time_point started, last_status, sweep_begun, last_arrival;
   bool is_done = false, is_stopping = false, is_triggered = true;
   int count = 0;
   std::string ended_early;
@@ -196,6 +197,7 @@ void LiveSource::State::add(Trigger trigger) {
   for (std::size_t c = 0; c < trigger.frames.size(); ++c) {
     auto& frame = trigger.frames[c];
     instant.stamps.push_back(frame ? Timestamp(frame->timestamp_ns) : std::nullopt);
+    if (frame) instant.arrival = std::max(instant.arrival, frame->arrival);
     // Clocks of cameras that run freely are set to the first one's as well as arrivals tell.
     if (frame && !is_triggered) *instant.stamps.back() -= pairing.ahead_ns(c);
     instant.set.images.push_back(frame ? std::optional(std::move(frame->image)) : std::nullopt);
@@ -332,6 +334,10 @@ LiveSource::~LiveSource() {
 
 const std::vector<Sequence>& LiveSource::sequences() const { return state_->sequences; }
 const std::vector<Timestamp>& LiveSource::timestamps() const { return state_->stamps; }
+Clock::time_point LiveSource::last_arrival() const { return state_->last_arrival; }
+const DeviceSettings& LiveSource::settings(std::size_t camera) const {
+  return state_->feeds[camera]->camera().settings();
+}
 double LiveSource::interval_ns() const { return state_->pairing.interval_ns(); }
 bool LiveSource::is_triggered() const { return state_->is_triggered; }
 const std::string& LiveSource::ended_early() const { return state_->ended_early; }
@@ -349,6 +355,7 @@ std::optional<FrameSet> LiveSource::next() {
       Instant instant = std::move(state.ready.front());
       state.ready.pop_front();
       state.stamps = std::move(instant.stamps);
+      state.last_arrival = instant.arrival;
       state.report(Clock::now());
       return std::move(instant.set);
     }

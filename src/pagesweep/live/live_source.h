@@ -60,7 +60,11 @@ class LiveSource : public FrameSource {
 
   /// Of the set that next() gave last, by each camera's clock.
   const std::vector<Timestamp>& timestamps() const;
+  /// When the last frame of that set had come from the network.
+  Clock::time_point last_arrival() const;
   double interval_ns() const;
+  /// What each camera was set to.
+  const DeviceSettings& settings(std::size_t camera) const;
   /// Whether the cameras are triggered together.
   bool is_triggered() const;
   /// Why the sweep is not whole; empty: it is.

@@ -16,19 +16,36 @@ namespace pagesweep {
 namespace {
 
 constexpr int most_frames = 100'000;
-constexpr std::size_t most_waiting = 200;                         ///< triggers; two seconds at 100 a second
-constexpr std::uintmax_t least_space = std::uintmax_t{64} << 20;  ///< [bytes] to be left on the disk
 
 struct Waiting {
   FrameSet set;
   std::vector<Timestamp> timestamps;
 };
 
+std::uintmax_t bytes_of(const Sequence& sequence) {
+  return static_cast<std::uintmax_t>(sequence.width) * static_cast<std::uintmax_t>(sequence.height) *
+         (sequence.is_8_bit() ? 1 : 2);
+}
+
+void require_room(const std::filesystem::path& folder, const std::vector<Sequence>& sequences,
+                  const RecorderLimits& limits) {
+  std::uintmax_t trigger = 0;
+  for (const Sequence& sequence : sequences) trigger += bytes_of(sequence);
+  const std::uintmax_t needed = limits.least_space + static_cast<std::uintmax_t>(limits.triggers_of_a_sweep) * trigger;
+  std::error_code failure;
+  const auto space = std::filesystem::space(folder, failure);
+  if (failure) throw cannot_write(folder, failure.message());
+  if (space.available < needed)
+    throw cannot_write(folder, fmt::format("the disk has room for {} MB and a sweep needs some {} MB: make room, or "
+                                           "record to another one",
+                                           space.available >> 20, (needed >> 20) + 1));
+}
+
 }  // namespace
 
 struct CaptureRecorder::State {
   std::filesystem::path folder;
-  std::vector<Sequence> sequences;
+  RecorderLimits limits;
   std::vector<std::unique_ptr<RecordingWriter>> writers;
   std::vector<SequenceFiles> files;
 
@@ -44,11 +61,14 @@ struct CaptureRecorder::State {
   void run();
 };
 
-CaptureRecorder::CaptureRecorder(const std::filesystem::path& folder, const std::vector<Sequence>& sequences)
+CaptureRecorder::CaptureRecorder(const std::filesystem::path& folder, const std::vector<Sequence>& sequences,
+                                 const RecorderLimits& limits)
     : state_(std::make_unique<State>()) {
   State& state = *state_;
   state.folder = folder;
-  state.sequences = sequences;
+  state.limits = limits;
+  std::filesystem::create_directories(folder);
+  require_room(folder, sequences, limits);
   for (const Sequence& sequence : sequences) {
     SequenceFiles files{.camera = sequence.camera, .frames = {}};
     files.bit_depth = sequence.bit_depth;
@@ -94,7 +114,9 @@ void CaptureRecorder::State::run() {
     lock.unlock();
     std::string failure;
     try {
-      if (std::filesystem::space(folder).available < least_space) throw cannot_write(folder, "the disk is full");
+      if (limits.delay.count() > 0) std::this_thread::sleep_for(limits.delay);
+      if (std::filesystem::space(folder).available < limits.least_space)
+        throw cannot_write(folder, "the disk is full: make room, or record to another one");
       store(waiting);
     } catch (const std::exception& error) {
       failure = error.what();
@@ -111,7 +133,7 @@ void CaptureRecorder::State::run() {
 
 bool CaptureRecorder::add(const FrameSet& set, const std::vector<Timestamp>& timestamps) {
   const std::lock_guard lock(state_->mutex);
-  if (state_->trouble.empty() && state_->queue.size() >= most_waiting)
+  if (state_->trouble.empty() && state_->queue.size() >= state_->limits.most_waiting)
     state_->trouble = fmt::format(
         "{}: the disk is too slow for the frames: record to a faster one, or lower the frame "
         "rate or the region",
@@ -158,6 +180,9 @@ Capture describe_capture(const std::filesystem::path& folder, std::vector<Sequen
   capture.sequences = std::move(files);
   capture.frame_interval_ns = live.interval_ns();
   capture.is_triggered = live.is_triggered();
+  for (std::size_t c = 0; c < capture.sequences.size(); ++c)
+    if (const auto exposure_us = live.settings(c).exposure_us; exposure_us && *exposure_us > 0)
+      capture.sequences[c].exposure_ms = {*exposure_us / 1000};
   return capture;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -11,12 +13,21 @@
 
 namespace pagesweep {
 
+/// What a disk has to be good for.
+struct RecorderLimits {
+  std::uintmax_t least_space = std::uintmax_t{64} << 20;  ///< [bytes] to be left on it, for all that is not frames
+  int triggers_of_a_sweep = 200;                          ///< for which there has to be room before the sweep
+  std::size_t most_waiting = 200;                         ///< triggers to be stored; two seconds at 100 a second
+  std::chrono::milliseconds delay{0};                     ///< that each trigger takes longer: a slow disk, for tests
+};
+
 /// Stores frames as they come, one recording a camera, in a thread of its own: what takes long on a disk delays nobody.
 class CaptureRecorder {
  public:
   /// \param sequences  what is known of the cameras; counts do not matter
-  /// \throws Error  if nothing can be written into the folder
-  CaptureRecorder(const std::filesystem::path& folder, const std::vector<Sequence>& sequences);
+  /// \throws Error  if nothing can be written into the folder, or its disk has no room for a sweep
+  CaptureRecorder(const std::filesystem::path& folder, const std::vector<Sequence>& sequences,
+                  const RecorderLimits& limits = {});
   ~CaptureRecorder();
 
   /// The next trigger.

@@ -272,7 +272,7 @@ Measurement reconstruct(FrameSource& source, const Rig& rig, const ScanOptions& 
   return measurement;
 }
 
-Scan flatten(Measurement measurement, const Picture& picture, const Rig& rig, const ScanOptions& options,
+Scan flatten(Measurement&& measurement, const Picture& picture, const Rig& rig, const ScanOptions& options,
              Progress& progress) {
   if (!rig.scanner)
     throw Error(ErrorKind::bad_input, "the rig has no \"scanner\": without it no picture can be flattened");
@@ -284,9 +284,9 @@ Scan flatten(Measurement measurement, const Picture& picture, const Rig& rig, co
   surface_options.reading_direction_rad = reading_direction(*rig.scanner);
 
   Scan scan;
+  scan.surfaces = fit_surface(measurement.points, surface_options, progress);
+  scan.pages = dewarp(scan.surfaces, picture, *rig.scanner, options.dewarp, progress, light_of(measurement, rig));
   scan.measurement = std::move(measurement);
-  scan.surfaces = fit_surface(scan.measurement.points, surface_options, progress);
-  scan.pages = dewarp(scan.surfaces, picture, *rig.scanner, options.dewarp, progress, light_of(scan.measurement, rig));
   return scan;
 }
 

@@ -102,9 +102,10 @@ Measurement reconstruct(FrameSource& frames, const Rig& rig, const ScanOptions& 
                         Progress& progress = no_progress(), const ScanSource& scan = {});
 
 /// The second half: points to flat pages.
+/// \param measurement  goes into what is returned, and is left as it was if this throws
 /// \throws Error  (bad_input) if the rig has no scanner or the picture is not of its size; (no_result) if no page is
 /// found
-Scan flatten(Measurement measurement, const Picture& scan, const Rig& rig, const ScanOptions& options = {},
+Scan flatten(Measurement&& measurement, const Picture& scan, const Rig& rig, const ScanOptions& options = {},
              Progress& progress = no_progress());
 
 /// The whole way: frames, time values, correspondences, points, surface, pages.
