@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -92,7 +93,10 @@ OpenedRig open(const LiveInput& input, const Rig& rig, LiveView& view) {
   std::vector<std::unique_ptr<GenicamCamera>> cameras;
   std::vector<Sequence> sequences;
   for (const std::string& text : input.cameras) {
-    cameras.push_back(open_camera(split(text, "--camera", "cam1=192.168.3.2"), rig, opened.devices));
+    const NamedDevice device = split(text, "--camera", "cam1=192.168.3.2");
+    if (std::ranges::find(sequences, device.name, &Sequence::camera) != sequences.end())
+      throw CLI::ValidationError("--camera", fmt::format("{} is named twice", device.name));
+    cameras.push_back(open_camera(device, rig, opened.devices));
     sequences.push_back(sequence_of(*cameras.back()));
   }
   opened.scanner = open_scanner(input.scanner, rig, opened.devices);

@@ -133,8 +133,9 @@ class FakeCamera {
   void fill(ArvBuffer* buffer) {
     auto [frame, timestamp_ns] = take_next();
     if (!is_wired_) {
-      const std::int64_t period_ns = std::max<std::int64_t>(1, read(device(), period_register)) * 1000;
       const bool is_triggered = read(device(), trigger_mode_register) == 1;
+      const std::int64_t period_ns = is_triggered ? std::llround(1e9 / options_.frame_rate)
+                                                  : std::max<std::int64_t>(1, read(device(), period_register)) * 1000;
       timestamp_ns = g_get_real_time() * 1000;
       if (!is_triggered) timestamp_ns = (timestamp_ns + period_ns / 2) / period_ns * period_ns;
       const std::int64_t begin_ns = sweep_begin_ns_;
@@ -294,9 +295,12 @@ void FakeRig::State::tick(std::int64_t number, std::int64_t timestamp_ns) {
       camera->begin_sweep(g_get_real_time() * 1000 + static_cast<std::int64_t>(options.delay_s * 1e9));
   }
   const long frame = sweep_tick < 0 ? -1 : static_cast<long>(number - sweep_tick);
+  const auto skips = [&](const MatrixCamera& camera) {
+    return camera.is_dropped(frame) ||
+           (camera.name() == options.slow_camera && frame >= options.slow_frame && frame % 2 == 1);
+  };
   for (auto& camera : cameras)
-    if (camera->is_connected() && camera->is_wired() && !camera->is_dropped(frame))
-      camera->trigger(frame, timestamp_ns);
+    if (camera->is_connected() && camera->is_wired() && !skips(*camera)) camera->trigger(frame, timestamp_ns);
   send_lines(frame, timestamp_ns);
 }
 

@@ -24,6 +24,8 @@ struct FakeRigOptions {
   std::string dead_camera;
   int dead_frame = 0;
   double back_s = 0;
+  std::string slow_camera;
+  int slow_frame = 0;
   int line_rows = 128;
   int repeat = 1;
 
@@ -38,6 +40,9 @@ struct FakeRigOptions {
     visit("dead", dead_camera, "", "a camera that dies suddenly");
     visit("dead-frame", dead_frame, "", "of the capture, at which that happens");
     visit("back", back_s, "s", "after which it is there again; 0: never");
+    visit("slow", slow_camera, "",
+          "a camera that slows down, as one that is too hot: it sees every second trigger only");
+    visit("slow-frame", slow_frame, "", "of the capture, at which that begins");
     visit("line-rows", line_rows, "", "rows that the line camera sends at a time");
     visit("repeat", repeat, "", "how often the frames are shown in one sweep: for endurance tests");
   }

@@ -3,12 +3,17 @@
 
 #include "pagesweep/live/arv_helpers_internal.h"
 #include "pagesweep/live/genicam_camera.h"
+#include "pagesweep/live/gige_probe_internal.h"
 
 namespace pagesweep {
 namespace {
 
 /// What only the camera itself can tell.
 void ask(FoundCamera& found) {
+  if (probe_gige(found.address) == GigeAnswer::none) {  // it was heard, but cannot be spoken to
+    found.problem = why_silent(found.address);
+    return;
+  }
   GError* failure = nullptr;
   const ArvHandle<ArvCamera> camera(arv_camera_new(found.id.c_str(), &failure));
   if (camera) arv_camera_get_sensor_size(camera.get(), &found.sensor_width, &found.sensor_height, &failure);
@@ -44,5 +49,7 @@ std::vector<FoundCamera> find_cameras() {
   for (FoundCamera& camera : cameras) ask(camera);
   return cameras;
 }
+
+std::string why_missing(const std::string& id) { return why_silent(id); }
 
 }  // namespace pagesweep

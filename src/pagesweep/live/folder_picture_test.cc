@@ -41,7 +41,7 @@ TEST(FolderPicture, TakesTheNewPictureWhenItIsWhole) {
   std::jthread writer([&] {
     std::ofstream out(folder / "new.png", std::ios::binary);
     out << bytes.substr(0, bytes.size() / 2) << std::flush;
-    std::this_thread::sleep_for(milliseconds(700));
+    std::this_thread::sleep_for(milliseconds(600));
     out << bytes.substr(bytes.size() / 2);
   });
   EXPECT_EQ(gray_of(scans->finish(milliseconds(1500))), 200);

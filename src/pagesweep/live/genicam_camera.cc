@@ -13,6 +13,7 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/live/arv_helpers_internal.h"
+#include "pagesweep/live/gige_probe_internal.h"
 #include "pagesweep/live/interface_mtu_internal.h"
 
 namespace pagesweep {
@@ -75,7 +76,8 @@ struct GenicamCamera::State {
   }
 
   void open(const std::string& id);
-  void require_control();
+  Error silent(const std::string& id) const;
+  Error taken() const;
   void set_region();
   void set_values();
   void read_exposure();
@@ -85,26 +87,26 @@ struct GenicamCamera::State {
 };
 
 void GenicamCamera::State::open(const std::string& id) {
+  const auto answer = probe_gige(id);
+  if (answer == GigeAnswer::none) throw silent(id);
+  if (answer == GigeAnswer::taken) throw taken();
   GError* failure = nullptr;
   camera.reset(arv_camera_new(id.c_str(), &failure));
-  if (camera) return;
-  const std::string message = failure ? failure->message : "no answer";
   g_clear_error(&failure);
-  throw Error(
-      ErrorKind::cannot_read,
-      fmt::format("{}: the camera \"{}\" does not answer ({}): see that it has power and a cable and is in this "
-                  "computer's network; `pagesweep cameras` lists those that answer",
-                  name, id, message));
+  if (!camera) throw silent(id);
+  ArvDevice* device = arv_camera_get_device(camera.get());
+  if (ARV_IS_GV_DEVICE(device) && !arv_gv_device_is_controller(ARV_GV_DEVICE(device))) throw taken();
 }
 
-void GenicamCamera::State::require_control() {
-  ArvDevice* device = arv_camera_get_device(camera.get());
-  if (!ARV_IS_GV_DEVICE(device) || arv_gv_device_is_controller(ARV_GV_DEVICE(device))) return;
-  throw Error(
-      ErrorKind::cannot_read,
-      fmt::format("{}: another program has the camera: end that program; after a crash the camera is free again "
-                  "within 3 s",
-                  name));
+Error GenicamCamera::State::silent(const std::string& id) const {
+  return {ErrorKind::cannot_read, fmt::format("{}: the camera \"{}\" does not answer: {}", name, id, why_silent(id))};
+}
+
+Error GenicamCamera::State::taken() const {
+  return {ErrorKind::cannot_read,
+          fmt::format("{}: another program has the camera: end that program; after a crash the camera is free again "
+                      "within 3 s",
+                      name)};
 }
 
 void GenicamCamera::State::set_region() {
@@ -212,7 +214,6 @@ GenicamCamera::GenicamCamera(std::string name, const std::string& id, const Devi
   state_->settings = settings;
   state_->format = format_named(state_->name, settings.pixel_format);
   state_->open(id);
-  state_->require_control();
   state_->set_region();
   state_->set_values();
   state_->read_exposure();

@@ -27,6 +27,10 @@ struct FoundCamera {
 /// All cameras that answer, on the network and on USB.
 std::vector<FoundCamera> find_cameras();
 
+/// Why a camera that should be there does not answer, and what to do, in words.
+/// \param id  its network address, or as find_cameras() told it before
+std::string why_missing(const std::string& id);
+
 /// What came in one buffer. Its pixels last as long as the call that hands it over.
 struct RawFrame {
   bool is_whole = false;  ///< else packets are missing

@@ -27,6 +27,17 @@ inline bool add_loopback_address(int descriptor, const std::string& label, const
   return ::ioctl(descriptor, SIOCSIFFLAGS, &request) == 0;
 }
 
+/// Sets the loopback interface's largest packet [bytes].
+inline bool set_loopback_mtu(int mtu) {
+  const int descriptor = ::socket(AF_INET, SOCK_DGRAM, 0);
+  ifreq request{};
+  std::strncpy(request.ifr_name, "lo", IFNAMSIZ - 1);
+  request.ifr_mtu = mtu;
+  const bool is_set = ::ioctl(descriptor, SIOCSIFMTU, &request) == 0;
+  ::close(descriptor);
+  return is_set;
+}
+
 /// Moves the calling thread, and those that it starts, into a network of its own with nothing but 127.0.0.1 to
 /// 127.0.0.3, so that a test meets neither real cameras nor other tests.
 /// \return false where the system does not permit that

@@ -108,7 +108,7 @@ void CaptureRecorder::State::run() {
   std::unique_lock lock(mutex);
   while (true) {
     changed.wait(lock, [&] { return !queue.empty() || is_ended; });
-    if (queue.empty() || !trouble.empty()) return;
+    if (queue.empty()) return;
     const Waiting waiting = std::move(queue.front());
     queue.pop_front();
     lock.unlock();
