@@ -122,7 +122,7 @@ class LiveRig : public ::testing::Test {
   }
   static FakeRigOptions slow_rig() {
     FakeRigOptions slow;
-    slow.frame_rate = 80, slow.delay_s = 0.45;
+    slow.frame_rate = 100, slow.delay_s = 0.4;
     return slow;
   }
   FakeRigOptions options = slow_rig();
@@ -222,7 +222,7 @@ void expect_a_sweep(const std::vector<Given>& given) {
 TEST_F(LiveRig, CamerasAreTriggeredByTheComputer) {
   const FakeRig rig(make_frames(), std::nullopt, options);
   DeviceSettings wanted = settings();
-  wanted.trigger = TriggerMode::software, wanted.frame_rate = 80;
+  wanted.trigger = TriggerMode::software, wanted.frame_rate = 100;
   const auto live = open_source({}, wanted);
   expect_a_sweep(record(*live, folder()));
   EXPECT_EQ(live->ended_early(), "");
@@ -233,12 +233,12 @@ TEST_F(LiveRig, CamerasAreTriggeredByTheComputer) {
 TEST_F(LiveRig, CamerasThatRunFreelyHaveTimesOfOneClock) {
   const FakeRig rig(make_frames(), std::nullopt, options);
   DeviceSettings wanted = settings();
-  wanted.trigger = TriggerMode::free_running, wanted.frame_rate = 80;
+  wanted.trigger = TriggerMode::free_running, wanted.frame_rate = 100;
   const auto live = open_source({}, wanted);
   const std::vector<Given> given = record(*live, folder());
   expect_a_sweep(given);
   EXPECT_FALSE(live->is_triggered());
-  EXPECT_NEAR(live->interval_ns(), 1.25e7, 1.5e6);
+  EXPECT_NEAR(live->interval_ns(), 1e7, 1e6);
   // The rig's clocks are seconds apart: put on one, frames of an instant are.
   const Capture capture = read_capture(folder());
   EXPECT_FALSE(capture.is_triggered);
@@ -315,21 +315,34 @@ TEST_F(LiveRig, WithoutAStripeItGivesUp) {
   EXPECT_THROW(live->next(), Error);
 }
 
+/// A sweep whose picture comes from the line camera; nothing if blocks of it were lost, as a loaded machine's fake
+/// cameras do.
+std::optional<Picture> take_line_picture(const DeviceSettings& line, int scan_height) {
+  const auto live = open_source();
+  const auto picture = take_lines(std::make_unique<GenicamCamera>("line", "127.0.0.3", line), scan_height);
+  while (live->next()) {
+  }
+  try {
+    return picture->finish(std::chrono::milliseconds(500));
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("blocks of 16 rows of the scan have not come whole"));
+    return std::nullopt;
+  }
+}
+
 TEST_F(LiveRig, TheLineCamerasRowsBecomeTheScanFromTheEndIfTheHeadMovesTheOtherWay) {
   Picture scan = make_picture(50, 70, 3, 8);
   auto& samples = std::get<Image<std::uint8_t>>(scan.samples);
   for (std::size_t i = 0; i < samples.size(); ++i) samples.data()[i] = static_cast<std::uint8_t>(i * 31 % 251);
   options.line_rows = 16;  // the last block has rows beyond the scan's end
   const FakeRig rig(make_frames(), scan, options);
-  const auto live = open_source();
   DeviceSettings line = rig.devices().of("line");
   line.width = 50, line.height = line.rows_a_buffer;
   line.is_reversed = true;
-  const auto picture = take_lines(std::make_unique<GenicamCamera>("line", "127.0.0.3", line), 70);
-  while (live->next()) {
-  }
-  const Picture taken = picture->finish(std::chrono::milliseconds(500));
-  const auto& got = std::get<Image<std::uint8_t>>(taken.samples);
+  std::optional<Picture> taken;
+  for (int i = 0; i < 3 && !taken; ++i) taken = take_line_picture(line, 70);
+  ASSERT_TRUE(taken);
+  const auto& got = std::get<Image<std::uint8_t>>(taken->samples);
   ASSERT_EQ(got.size(), samples.size());
   for (int y = 0; y < 70; ++y) EXPECT_TRUE(std::ranges::equal(got.row(69 - y), samples.row(y))) << y;
 }

@@ -8,6 +8,7 @@
 #include <deque>
 #include <exception>
 #include <mutex>
+#include <ranges>
 #include <set>
 #include <thread>
 #include <utility>
@@ -148,6 +149,8 @@ struct LiveSource::State {
   void begin_sweep();
   void place(Instant& instant);
   void look_for_faults(Clock::time_point now);
+  void look_for_silent_at_end(Clock::time_point now);
+  void lose(std::size_t camera);
   void fail(const std::string& what);
   void finish();
   void stop();
@@ -235,6 +238,23 @@ void LiveSource::State::fail(const std::string& what) {
   is_done = true;
 }
 
+void LiveSource::State::lose(std::size_t camera) {
+  feeds[camera]->give_up();
+  fail(fmt::format("{}: it has stopped sending frames after {}: see to its power, cable and temperature",
+                   sequences[camera].camera, feeds[camera]->whole));
+}
+
+/// A short sweep may be over before a silence is long enough to be one.
+void LiveSource::State::look_for_silent_at_end(Clock::time_point now) {
+  const auto silence = [&](const std::unique_ptr<Feed>& feed) { return seconds(feed->silence(now)); };
+  const double least = std::ranges::min(feeds | std::views::transform(silence));
+  for (std::size_t c = 0; c < feeds.size() && ended_early.empty(); ++c) {
+    if (1e9 * (silence(feeds[c]) - least) < 0.5 * frames_around_sweep * pairing.interval_ns()) continue;
+    is_done = false;
+    lose(c);
+  }
+}
+
 void LiveSource::State::look_for_faults(Clock::time_point now) {
   double fastest = 0;
   bool any_sent = false, all_silent = true;
@@ -256,9 +276,7 @@ void LiveSource::State::look_for_faults(Clock::time_point now) {
       if (all_silent && is_wired && watch.state() == SweepWatch::State::waiting) continue;  // nobody triggers yet
       if (all_silent && is_wired)
         return fail("the triggers have ended before the stripe had left: let them run on until it has");
-      feeds[c]->give_up();
-      return fail(fmt::format("{}: it has stopped sending frames after {}: see to its power, cable and temperature",
-                              name, feeds[c]->whole));
+      return lose(c);
     } else if (!is_slow[c] && now - started > longest_start && feeds[c]->rate_hz() < clearly_slower * fastest) {
       is_slow[c] = true;
       remarks.push_back(
@@ -369,6 +387,11 @@ std::optional<FrameSet> LiveSource::next() {
     state.look_for_faults(now);
     lock.unlock();
     state.pair(now, state.is_done && !state.ended_early.empty());
+    if (state.is_done && state.ended_early.empty()) {
+      lock.lock();
+      state.look_for_silent_at_end(now);
+      lock.unlock();
+    }
     state.report(now);
   }
 }
