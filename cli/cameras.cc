@@ -67,8 +67,8 @@ void add_cameras_command(CLI::App& app) {
 
 Cameras that speak GenICam, by GigE Vision or USB3 Vision: vendor, model, serial number, address,
 sensor and pixel formats, and why one cannot be used. Their ids are what `pagesweep capture` and
-`pagesweep scan --live` take; addresses do as well. Name a camera that should be there and is not, to
-be told why.
+`pagesweep scan --live` take; addresses do as well. Name a camera that should be there and is not,
+to be told why.
 )");
   const auto arguments = std::make_shared<Arguments>();
   command->add_option("CAMERA", arguments->expected, "cameras that should be there: addresses, ids or serial numbers");
