@@ -77,7 +77,7 @@ Page make_page(const PaperView& view, const Occlusion& occlusion, const PageOutl
 void cover(const PaperView& view, const PageFrame& frame, const Picture& scan, const DewarpOptions& options,
            Page& page) {
   if (options.obstructions != Obstructions::keep) {
-    const Image<char> mask = find_obstructions(view.surface(), frame, page.picture.pixels_per_mm);
+    const Image<char> mask = find_obstructions(view.surface(), frame, page.picture);
     if (!mask.empty() && options.obstructions == Obstructions::fill)
       cover_with_paper(mask, page);
     else if (!mask.empty())

@@ -17,6 +17,9 @@ constexpr double cell_mm = 3;            // of the paper's colour
 constexpr double paper_quantile = 0.8;   // of a cell's samples: paper between letters
 constexpr double least_contrast = 0.15;  // between paper and table
 constexpr double beside_mm = 8;          // how far beside the page the table is looked at
+constexpr double shade_cell_mm = 0.5;    // in which the shade around an obstruction is followed
+constexpr int shade_reach = 12;          // cells
+constexpr double least_shade = 0.015;    // of the paper's light
 
 float median_of(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -84,6 +87,99 @@ float colour_at(const Image<float>& cells, int x, int y, int cell) {
   const int i2 = std::min(i + 1, cells.width() - 1), j2 = std::min(j + 1, cells.height() - 1);
   const float a = u - static_cast<float>(i), b = v - static_cast<float>(j);
   return (1 - b) * ((1 - a) * cells(i, j) + a * cells(i2, j)) + b * ((1 - a) * cells(i, j2) + a * cells(i2, j2));
+}
+
+/// Brightness of the page in cells, text filled, and which of them are masked.
+struct ShadeCells {
+  int size_px;
+  Image<float> brightness;
+  Image<char> masked;
+
+  ShadeCells(const Image<char>& mask, const Picture& picture)
+      : size_px(std::max(1, static_cast<int>(std::lround(shade_cell_mm * picture.pixels_per_mm)))),
+        brightness((mask.width() + size_px - 1) / size_px, (mask.height() + size_px - 1) / size_px, 0.0f),
+        masked(brightness.width(), brightness.height(), false) {
+    std::visit(
+        [&](const auto& samples) {
+          parallel_rows(masked.height(), [&](int j) { average(samples, picture.channels, mask, j); });
+        },
+        picture.samples);
+    brightness = close_dark_spots(brightness, 2);
+  }
+
+ private:
+  template <class T>
+  void average(const Image<T>& samples, int channels, const Image<char>& mask, int j) {
+    for (int i = 0; i < masked.width(); ++i) {
+      double sum = 0;
+      int count = 0;
+      for (int y = j * size_px; y < std::min((j + 1) * size_px, mask.height()); ++y)
+        for (int x = i * size_px; x < std::min((i + 1) * size_px, mask.width()); ++x) {
+          for (int c = 0; c < channels; ++c) sum += samples(x * channels + c, y), ++count;
+          if (mask(x, y)) masked(i, j) = true;
+        }
+      brightness(i, j) = static_cast<float>(sum / count);
+    }
+  }
+};
+
+/// Brightness of the unshaded paper around what is masked: the median of blocks of cells that lie beyond the reach of
+/// shade, spread into the rest.
+Image<float> unshaded_paper(const ShadeCells& cells) {
+  constexpr int block = 8;
+  const Image<char>& masked = cells.masked;
+  Image<char> near(masked.width(), masked.height(), false);
+  for (int j = 0; j < masked.height(); ++j)
+    for (int i = 0; i < masked.width(); ++i)
+      if (masked(i, j))
+        for (int b = std::max(0, j - shade_reach); b <= std::min(masked.height() - 1, j + shade_reach); ++b)
+          for (int a = std::max(0, i - shade_reach); a <= std::min(masked.width() - 1, i + shade_reach); ++a)
+            near(a, b) = true;
+  Image<float> levels((masked.width() + block - 1) / block, (masked.height() + block - 1) / block, not_a_number);
+  for (int j = 0; j < levels.height(); ++j)
+    for (int i = 0; i < levels.width(); ++i) {
+      std::vector<float> values;
+      for (int b = j * block; b < std::min((j + 1) * block, masked.height()); ++b)
+        for (int a = i * block; a < std::min((i + 1) * block, masked.width()); ++a)
+          if (!near(a, b)) values.push_back(cells.brightness(a, b));
+      if (!values.empty()) levels(i, j) = median_of(values);
+    }
+  spread_into_holes(levels);
+  Image<float> paper(masked.width(), masked.height());
+  for (int j = 0; j < paper.height(); ++j)
+    for (int i = 0; i < paper.width(); ++i) paper(i, j) = colour_at(levels, i, j, block);
+  return paper;
+}
+
+/// Adds the shade that an obstruction casts around it, and what is left of its rim: from the mask outwards, as long as
+/// it becomes brighter and is darker than the paper beyond. Of print only what is broader than 2 mm could be taken for
+/// shade, and only as far as it becomes brighter.
+void add_shade(const Picture& picture, Image<char>& mask) {
+  constexpr float noise = 0.01f;
+  ShadeCells cells(mask, picture);
+  const Image<float> paper = unshaded_paper(cells);
+  std::vector<std::pair<int, int>> rim;
+  for (int j = 0; j < paper.height(); ++j)
+    for (int i = 0; i < paper.width(); ++i)
+      if (cells.masked(i, j)) rim.emplace_back(i, j);
+  Image<char> shaded = cells.masked;
+  for (int step = 0; step < shade_reach && !rim.empty(); ++step) {
+    std::vector<std::pair<int, int>> next;
+    for (const auto& [i, j] : rim)
+      for (const auto& [a, b] : {std::pair{i + 1, j}, {i - 1, j}, {i, j + 1}, {i, j - 1}}) {
+        if (!paper.contains(a, b) || cells.masked(a, b)) continue;
+        shaded(a, b) = true;  // one cell more than is seen to be in the shade: there it ends
+        const float here = cells.brightness(a, b), full = paper(a, b);
+        if (!(here < (1 - static_cast<float>(least_shade)) * full)) continue;
+        if (step > 0 && here < cells.brightness(i, j) - noise * full) continue;
+        cells.masked(a, b) = true;
+        next.emplace_back(a, b);
+      }
+    rim = std::move(next);
+  }
+  for (int y = 0; y < mask.height(); ++y)
+    for (int x = 0; x < mask.width(); ++x)
+      if (shaded(x / cells.size_px, y / cells.size_px)) mask(x, y) = true;
 }
 
 void forget_place(Page& page, int x, int y) {
@@ -156,7 +252,9 @@ Image<char> connected_with_border(const Image<char>& dark) {
 
 }  // namespace
 
-Image<char> find_obstructions(const PageSurface& surface, const PageFrame& frame, double pixels_per_mm, double rim_mm) {
+Image<char> find_obstructions(const PageSurface& surface, const PageFrame& frame, const Picture& picture,
+                              double rim_mm) {
+  const double pixels_per_mm = picture.pixels_per_mm;
   if (!std::ranges::count(surface.status.pixels(), PixelStatus::covered)) return {};
   const double reach = rim_mm / surface.spacing_mm;
   const int nodes = static_cast<int>(std::ceil(reach));
@@ -176,6 +274,7 @@ Image<char> find_obstructions(const PageSurface& surface, const PageFrame& frame
           }
     }
   });
+  if (std::ranges::count(mask.pixels(), char{true})) add_shade(picture, mask);
   return mask;
 }
 

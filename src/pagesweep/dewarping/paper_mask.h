@@ -24,9 +24,11 @@ constexpr auto names_of(Obstructions) { return std::array<std::string_view, 3>{"
 enum class Surroundings { keep, mask };
 constexpr auto names_of(Surroundings) { return std::array<std::string_view, 2>{"keep", "mask"}; }
 
-/// Which pixels of a page show something that stands above the paper: the surface says so (PixelStatus::covered), and a
-/// rim of `rim_mm` around it, within which no node of the surface lies, is taken with it. Empty if nothing does.
-Image<char> find_obstructions(const PageSurface& surface, const PageFrame& frame, double pixels_per_mm,
+/// Which pixels of a page show something that stands above the paper: the surface says so (PixelStatus::covered). A rim
+/// of `rim_mm` around it, within which no node of the surface lies, is taken with it, and so is its shadow, up to 6 mm
+/// beyond. Empty if nothing stands above the paper.
+/// \param picture  of the page, at its own scale
+Image<char> find_obstructions(const PageSurface& surface, const PageFrame& frame, const Picture& picture,
                               double rim_mm = 1.5);
 
 /// Which pixels of a page show no paper: what is darker than half-way between paper and table, where the surface has no

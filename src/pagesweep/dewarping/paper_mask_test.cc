@@ -21,9 +21,11 @@ struct Marred {
   Picture scan;
   Scanner scanner = make_small_scanners(4, 440, 380)[1].second;
 
-  Marred() {
+  /// \param with_shadow  below the finger, 3 mm wide, softly ending
+  explicit Marred(bool with_shadow = false) {
     const Sheet sheet = tilted_plane(0, 5);
     surface = make_surface(sheet, sheet, {-50, -42}, {50, 42});
+    const double shadow_mm = with_shadow ? 3 : 0;
     for (int j = 0; j < surface.rows(); ++j)
       for (int i = 0; i < surface.columns(); ++i) {
         const Eigen::Vector2d at = paper.page_from_paper({surface.s_of(i), surface.t_of(j)});
@@ -31,10 +33,12 @@ struct Marred {
         if (!paper.contains({surface.s_of(i), surface.t_of(j)}) || is_torn(at))
           surface.status(i, j) = PixelStatus::off_surface;
       }
-    scan = render_scan(sheet, scanner, [](double s, double t) {
+    scan = render_scan(sheet, scanner, [shadow_mm](double s, double t) {
       const Eigen::Vector2d at = paper.page_from_paper({s, t});
       if (is_finger(at)) return 0.45;
       if (!paper.contains({s, t}) || is_torn(at)) return 0.1;
+      const double beyond_mm = std::hypot(at.x() - finger_x, at.y() - finger_y) - finger_radius;
+      if (beyond_mm < shadow_mm) return 0.75 - 0.2 * (1 - beyond_mm / shadow_mm);
       return at.x() > 30 && at.x() < 50 && at.y() > 20 && at.y() < 50 ? 0.15 : 0.75;
     });
     scan.pixels_per_mm = 4;
@@ -72,6 +76,18 @@ TEST(PaperMask, AFingerStaysIsMaskedOrFilledAsAsked) {
   }
 }
 
+TEST(PaperMask, TheFingersShadowGoesWithItAndNoPrint) {
+  const Marred marred(true);
+  EXPECT_NEAR(at(marred.page({}), 10, 40), 0.62, 0.04);
+  const Page filled = marred.page({.obstructions = Obstructions::fill});
+  for (double y = 20; y < 60; y += 0.5)
+    for (double x = 0.5; x < 20; x += 0.5) EXPECT_NEAR(at(filled, x, y), 0.75, 0.015) << x << " " << y;
+  EXPECT_FALSE(is_known(filled, 11, 40));
+  EXPECT_TRUE(is_known(filled, 14, 40));
+  EXPECT_NEAR(at(filled, 40, 30), 0.15, 0.01);
+  EXPECT_TRUE(is_known(filled, 40, 30));
+}
+
 TEST(PaperMask, TheTableInATornCornerIsMaskedButNotPrint) {
   const Marred marred;
   EXPECT_NEAR(at(marred.page({}), 85, 69), 0.1, 0.02);
@@ -86,7 +102,7 @@ TEST(PaperMask, NothingIsMaskedOnACleanPage) {
   Marred marred;
   for (PixelStatus& status : marred.surface.status.pixels())
     if (status == PixelStatus::covered) status = PixelStatus::ok;
-  EXPECT_TRUE(find_obstructions(marred.surface, paper, 4).empty());
+  EXPECT_TRUE(find_obstructions(marred.surface, paper, marred.page({}).picture).empty());
 }
 
 }  // namespace
