@@ -17,6 +17,7 @@ constexpr double cell_mm = 3;            // of the paper's colour
 constexpr double paper_quantile = 0.8;   // of a cell's samples: paper between letters
 constexpr double least_contrast = 0.15;  // between paper and table
 constexpr double beside_mm = 8;          // how far beside the page the table is looked at
+constexpr double measured_rim_mm = 2.5;  // as far as the measurement may reach beyond a torn edge
 constexpr double shade_cell_mm = 0.5;    // in which the shade around an obstruction is followed
 constexpr int shade_reach = 12;          // cells
 constexpr double least_shade = 0.015;    // of the paper's light
@@ -53,6 +54,22 @@ void spread_into_holes(Image<float>& cells) {
   }
 }
 
+/// Forgets cells that are filled with print: those clearly darker than most around them.
+Image<float> without_print(const Image<float>& cells) {
+  constexpr int reach = 3;
+  constexpr float clearly = 0.97f;
+  Image<float> paper = cells;
+  for (int y = 0; y < cells.height(); ++y)
+    for (int x = 0; x < cells.width(); ++x) {
+      std::vector<float> around;
+      for (int j = std::max(0, y - reach); j <= std::min(cells.height() - 1, y + reach); ++j)
+        for (int i = std::max(0, x - reach); i <= std::min(cells.width() - 1, x + reach); ++i)
+          if (std::isfinite(cells(i, j))) around.push_back(cells(i, j));
+      if (!around.empty() && cells(x, y) < clearly * median_of(around)) paper(x, y) = not_a_number;
+    }
+  return paper;
+}
+
 /// The paper's colour in one channel, cell by cell, from what is not masked.
 template <class T>
 Image<float> paper_colour(const Image<T>& samples, int channels, int channel, const Image<char>& mask, int cell) {
@@ -72,8 +89,9 @@ Image<float> paper_colour(const Image<T>& samples, int channels, int channel, co
       colours(i, j) = *at;
     }
   });
-  spread_into_holes(colours);
-  return colours;
+  Image<float> paper = without_print(colours);
+  spread_into_holes(paper);
+  return paper;
 }
 
 /// Bilinear between the cells' middles.
@@ -151,9 +169,9 @@ Image<float> unshaded_paper(const ShadeCells& cells) {
   return paper;
 }
 
-/// Adds the shade that an obstruction casts around it, and what is left of its rim: from the mask outwards, as long as
-/// it becomes brighter and is darker than the paper beyond. Of print only what is broader than 2 mm could be taken for
-/// shade, and only as far as it becomes brighter.
+/// Adds the shadow that an obstruction casts around it, the light that its edges throw there, and what is left of its
+/// rim: from the mask outwards, as long as it differs less and less from the paper beyond. Of print only what is
+/// broader than 2 mm could be taken for it, and only as far as it becomes more like paper.
 void add_shade(const Picture& picture, Image<char>& mask) {
   constexpr float noise = 0.01f;
   ShadeCells cells(mask, picture);
@@ -169,9 +187,10 @@ void add_shade(const Picture& picture, Image<char>& mask) {
       for (const auto& [a, b] : {std::pair{i + 1, j}, {i - 1, j}, {i, j + 1}, {i, j - 1}}) {
         if (!paper.contains(a, b) || cells.masked(a, b)) continue;
         shaded(a, b) = true;  // one cell more than is seen to be in the shade: there it ends
-        const float here = cells.brightness(a, b), full = paper(a, b);
-        if (!(here < (1 - static_cast<float>(least_shade)) * full)) continue;
-        if (step > 0 && here < cells.brightness(i, j) - noise * full) continue;
+        const float off = std::abs(cells.brightness(a, b) - paper(a, b));
+        const float before = std::abs(cells.brightness(i, j) - paper(i, j));
+        if (!(off > static_cast<float>(least_shade) * paper(a, b))) continue;
+        if (step > 0 && off > before + noise * paper(a, b)) continue;
         cells.masked(a, b) = true;
         next.emplace_back(a, b);
       }
@@ -210,10 +229,29 @@ Levels find_levels(const FlatPreview& preview, const PageFrame& frame) {
   return {*at, median_of(table)};
 }
 
-/// Pixels that are dark and off the measured paper.
+/// How sure it is that a node of the surface shows paper. At its rim the measurement goes on a little beyond the paper.
+enum class Ground : char { unmeasured, rim, paper };
+
+Image<Ground> ground_of(const PageSurface& surface) {
+  const int reach = static_cast<int>(std::ceil(measured_rim_mm / surface.spacing_mm));
+  Image<Ground> ground(surface.columns(), surface.rows(), Ground::unmeasured);
+  parallel_rows(ground.height(), [&](int j) {
+    for (int i = 0; i < ground.width(); ++i) {
+      if (surface.status(i, j) != PixelStatus::ok) continue;
+      ground(i, j) = Ground::paper;
+      for (int b = j - reach; b <= j + reach; ++b)
+        for (int a = i - reach; a <= i + reach; ++a)
+          if (surface.status.contains(a, b) && surface.status(a, b) != PixelStatus::ok) ground(i, j) = Ground::rim;
+    }
+  });
+  return ground;
+}
+
+/// Pixels that are dark and off the measured paper; at its rim only those that are nearly as dark as the table.
 Image<char> find_dark(const PageSurface& surface, const FlatPreview& preview, const PageFrame& frame, const Page& page,
-                      double threshold) {
+                      const Levels& levels) {
   const Image<float> cells = close_dark_spots(preview.brightness, 1);
+  const Image<Ground> grounds = ground_of(surface);
   const Picture& picture = page.picture;
   Image<char> dark(picture.width(), picture.height(), false);
   parallel_rows(dark.height(), [&](int y) {
@@ -224,8 +262,11 @@ Image<char> find_dark(const PageSurface& surface, const FlatPreview& preview, co
       if (!preview.brightness.contains(i, j)) continue;
       const auto a = static_cast<int>(std::lround((paper.x() - surface.s0_mm) / surface.spacing_mm));
       const auto b = static_cast<int>(std::lround((paper.y() - surface.t0_mm) / surface.spacing_mm));
-      if (surface.status.contains(a, b) && surface.status(a, b) == PixelStatus::ok) continue;
-      dark(x, y) = double(cells(i, j)) < threshold || std::isnan(preview.brightness(i, j));
+      const Ground ground = grounds.contains(a, b) ? grounds(a, b) : Ground::unmeasured;
+      if (ground == Ground::paper) continue;
+      const double share = ground == Ground::rim ? 0.25 : 0.5;
+      dark(x, y) = double(cells(i, j)) < levels.table + share * (levels.paper - levels.table) ||
+                   std::isnan(preview.brightness(i, j));
     }
   });
   return dark;
@@ -248,6 +289,22 @@ Image<char> connected_with_border(const Image<char>& dark) {
     visit(x - 1, y), visit(x + 1, y), visit(x, y - 1), visit(x, y + 1);
   }
   return outside;
+}
+
+/// Adds the blurred edge of what is masked: pixels beside it, up to half a millimetre away, that are darker than the
+/// threshold themselves.
+void add_fringe(const Picture& picture, double threshold, Image<char>& mask) {
+  const int steps = std::max(1, static_cast<int>(std::lround(0.5 * picture.pixels_per_mm)));
+  for (int step = 0; step < steps; ++step) {
+    const Image<char> before = mask;
+    parallel_rows(mask.height(), [&](int y) {
+      for (int x = 0; x < mask.width(); ++x) {
+        if (before(x, y) || !(brightness_at(picture, {x, y}) < threshold)) continue;
+        for (const auto& [a, b] : {std::pair{x + 1, y}, {x - 1, y}, {x, y + 1}, {x, y - 1}})
+          if (before.contains(a, b) && before(a, b)) mask(x, y) = true;
+      }
+    });
+  }
 }
 
 }  // namespace
@@ -282,7 +339,9 @@ Image<char> find_surroundings(const PaperView& view, const Picture& scan, const 
   const FlatPreview preview = make_flat_preview(view, scan, beside_mm);
   const Levels levels = find_levels(preview, frame);
   if (!(levels.table < (1 - least_contrast) * levels.paper)) return {};
-  return connected_with_border(find_dark(view.surface(), preview, frame, page, 0.5 * (levels.paper + levels.table)));
+  Image<char> outside = connected_with_border(find_dark(view.surface(), preview, frame, page, levels));
+  add_fringe(page.picture, 0.5 * (levels.paper + levels.table), outside);
+  return outside;
 }
 
 void cover_with(const Image<char>& mask, double brightness, Page& page) {

@@ -32,7 +32,8 @@ Image<char> find_obstructions(const PageSurface& surface, const PageFrame& frame
                               double rim_mm = 1.5);
 
 /// Which pixels of a page show no paper: what is darker than half-way between paper and table, where the surface has no
-/// measured paper either, and connected with the page's border. Empty if the table is not darker than paper.
+/// measured paper either (at the rim of that: nearly as dark as the table), and connected with the page's border. Empty
+/// if the table is not darker than paper.
 Image<char> find_surroundings(const PaperView& view, const Picture& scan, const PageFrame& frame, const Page& page);
 
 /// Covers pixels with one brightness (a share of white). They are no longer the scan's: their places in the scan map
