@@ -13,13 +13,13 @@
 namespace pagesweep {
 namespace {
 
-constexpr double slope_reach_mm = 1.5;             // normals are taken over twice that
-constexpr double least_gain = 0.5, most_gain = 4;  // beyond, print would be noise
-constexpr double crease_mm = 1;                    // beside the gutter, where light is taken to be what it is there
-constexpr double rim_mm = 3;                       // likewise at the free edges
-constexpr int glow_step = 4;                       // rows of gains
-constexpr double sample_pitch_mm = 8;              // of blank paper, where the lamp is looked for
-constexpr double paper_quantile = 0.85;            // of the light in a cell: paper between the lines
+constexpr double slope_reach_mm = 1.5;                // normals are taken over twice that
+constexpr double least_gain = 0.5, most_gain = 4;     // beyond, print would be noise
+constexpr double crease_mm = 1;                       // beside the gutter, where light is taken to be what it is there
+constexpr double rim_mm = 3;                          // likewise at the free edges
+constexpr int glow_step = 4;                          // rows of gains
+constexpr double sample_pitch_mm = 8;                 // of blank paper, where the lamp is looked for
+constexpr double paper_from = 0.75, paper_to = 0.95;  // quantiles of the light in a cell: paper between the lines
 constexpr double least_paper_light = 0.05;
 
 /// Where the scan's pixel sees the plane on which the scanner's white was measured.
@@ -30,24 +30,38 @@ Eigen::Vector3d on_reference(const Scanner& scanner, const Eigen::Vector2d& pixe
   return ray->origin + (height_mm - ray->origin.z()) / ray->direction.z() * ray->direction;
 }
 
-/// Light of the paper in a cell of the scan around a spot: bright, but not the brightest.
-double paper_light(const PaperView& view, const Picture& scan, const TransferCurve& curve,
-                   const Eigen::Vector2d& paper_mm) {
+/// Paper between the lines.
+struct BrightPaper {
+  double light = 0;
+  Eigen::Vector2d paper_mm = Eigen::Vector2d::Zero();
+};
+
+/// What is bright, but not the brightest, in a cell around a spot, and where that is: light falls off within a cell,
+/// too.
+BrightPaper bright_paper(const PaperView& view, const Picture& scan, const TransferCurve& curve,
+                         const Eigen::Vector2d& paper_mm) {
   constexpr int steps = 10;
-  std::vector<double> lights;
+  std::vector<BrightPaper> spots;
   for (int k = 0; k < steps * steps; ++k) {
     const Eigen::Vector2d offset((k % steps + 0.5) / steps - 0.5, (k / steps + 0.5) / steps - 0.5);
-    const auto pixel = view.position(paper_mm + sample_pitch_mm * offset);
-    if (!pixel || !view.scanner().sees(*pixel)) return 0;
+    const Eigen::Vector2d spot = paper_mm + sample_pitch_mm * offset;
+    const auto pixel = view.position(spot);
+    if (!pixel || !view.scanner().sees(*pixel)) return {};
     const int x = std::clamp(static_cast<int>(std::lround(pixel->x())), 0, scan.width() - 1);
     const int y = std::clamp(static_cast<int>(std::lround(pixel->y())), 0, scan.height() - 1);
     double sum = 0;
     for (int c = 0; c < scan.channels; ++c) sum += double(curve.light_of(scan, x, y, c));
-    lights.push_back(sum / scan.channels);
+    spots.push_back({sum / scan.channels, spot});
   }
-  const auto at = lights.begin() + static_cast<std::ptrdiff_t>(paper_quantile * double(lights.size()));
-  std::nth_element(lights.begin(), at, lights.end());
-  return *at;
+  std::ranges::stable_sort(spots, {}, &BrightPaper::light);
+  const auto rank = [&](double share) { return static_cast<std::size_t>(share * double(spots.size())); };
+  const std::span<const BrightPaper> bright = std::span(spots).subspan(rank(paper_from), rank(paper_to - paper_from));
+  BrightPaper mean;
+  for (const BrightPaper& spot : bright) {
+    mean.light += spot.light / double(bright.size());
+    mean.paper_mm += spot.paper_mm / double(bright.size());
+  }
+  return mean;
 }
 
 /// A place along a side of the page, moved away from its free ends: the last measured slopes there are noisy.
@@ -66,7 +80,7 @@ struct PageLight::Spot {
 
 PageLight::PageLight(std::span<const PaperView> views, const Picture& scan, const ScanLight& light)
     : views_(views), scan_(scan), light_(light) {
-  if (!light_.lamp) light_.lamp = find_lamp(light_, sample_paper());
+  if (!light_.lamp || !light_.ambient) light_ = find_light(light_, sample_paper());
 }
 
 PageLight::Spot PageLight::spot_at(std::size_t page, const Eigen::Vector2d& paper_mm) const {
@@ -117,12 +131,13 @@ std::vector<PaperSample> PageLight::sample_paper() const {
         const auto a = static_cast<int>(std::lround((paper.x() - surface.s0_mm) / surface.spacing_mm));
         const auto b = static_cast<int>(std::lround((paper.y() - surface.t0_mm) / surface.spacing_mm));
         if (surface.status(a, b) != PixelStatus::ok) continue;
-        const Spot spot = spot_at(page, paper);
-        const double light = spot.seen ? paper_light(views_[page], scan_, curve, paper) : 0;
-        if (!(light > least_paper_light)) continue;
-        PaperSample sample{spot.point, spot.normal, spot.at_reference, 0, light, static_cast<int>(page)};
+        const BrightPaper bright = bright_paper(views_[page], scan_, curve, paper);
+        if (!(bright.light > least_paper_light)) continue;
+        const Spot spot = spot_at(page, bright.paper_mm);
+        if (!spot.seen) continue;
+        PaperSample sample{spot.point, spot.normal, spot.at_reference, 0, bright.light, static_cast<int>(page)};
         if (glow) {
-          const ChannelLight by_channel = glow->at(paper, spot.point, spot.normal);
+          const ChannelLight by_channel = glow->at(bright.paper_mm, spot.point, spot.normal);
           sample.glow = (by_channel[0] + by_channel[1] + by_channel[2]) / 3;
         }
         found[static_cast<std::size_t>(j * columns + i)] = sample;
@@ -166,7 +181,7 @@ LightGain PageLight::gain(std::size_t page, const PageFrame& frame) const {
     if (!glow) return 0.0;
     const int row = j / glow_step;
     const double share = double(j % glow_step) / glow_step;
-    return (1 - share) * glows(i, row)[c] + share * glows(i, row + 1)[c];
+    return (1 - light_.ambient.value_or(0)) * ((1 - share) * glows(i, row)[c] + share * glows(i, row + 1)[c]);
   };
   parallel_rows(rows, [&](int j) {
     for (int i = 0; i < columns; ++i) {

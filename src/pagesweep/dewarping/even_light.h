@@ -29,8 +29,8 @@ class PageLight {
   /// \param views  all pages of the scan; kept, with `scan`, as references
   PageLight(std::span<const PaperView> views, const Picture& scan, const ScanLight& light);
 
-  /// The lamp that is reckoned with: the rig's, or what the pages themselves show; nothing: light from afar.
-  const std::optional<LampBar>& lamp() const { return light_.lamp; }
+  /// The light that is reckoned with: what was known of it, and what the pages themselves show.
+  const ScanLight& light() const { return light_; }
   LightGain gain(std::size_t page, const PageFrame& frame) const;
 
  private:

@@ -187,6 +187,22 @@ TEST(EvenLight, TheLampIsFoundFromThePaperIfTheRigDoesNotKnowIt) {
   EXPECT_GT(low / high, 0.96);
 }
 
+TEST(EvenLight, ThePaperShowsHowMuchOfTheLightIsAmbient) {
+  for (const double ambient : {0.4, 1.0}) {
+    const Lit lit(cylinder(70, 20), {.lamp = LampBar{350, 400, 0}, .ambient = ambient});
+    const auto [paper, dark] = Lit::errors(lit.page(Shading::even, {.lamp = LampBar{350, 400, 0}}));
+    EXPECT_LT(paper, 0.015) << ambient;
+    EXPECT_LT(dark, 0.025) << ambient;
+  }
+}
+
+TEST(EvenLight, APictureWithoutShadingGetsNone) {
+  const Lit lit(cylinder(70, 20), {.ambient = 1});
+  const auto [paper, dark] = Lit::errors(lit.page(Shading::even));
+  EXPECT_LT(paper, 0.015);
+  EXPECT_LT(dark, 0.025);
+}
+
 TEST(EvenLight, ALevelPageStaysAsItIsToTheLastBit) {
   const Lit lit(tilted_plane(0, 3), {});
   const auto samples = [&](Shading shading) {

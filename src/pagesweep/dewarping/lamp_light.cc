@@ -65,17 +65,22 @@ struct PlacedSample {
   PlacedSpot spot, reference;
 };
 
+/// Irradiance of each sample relative to the reference. Without a bar, light comes from afar.
+std::vector<double> light_on(std::span<const PlacedSample> places, const std::optional<LampBar>& bar) {
+  std::vector<double> direct;
+  for (const auto& [spot, reference] : places)
+    direct.push_back(bar ? spot.irradiance(*bar) / reference.irradiance(*bar) : spot.towards_up / reference.towards_up);
+  return direct;
+}
+
 /// How uneven blank paper is after the light is divided out: 0 not at all, 1 altogether. Each sheet's own brightness is
-/// free. Without a bar, light comes from afar.
-double unevenness(const std::optional<LampBar>& bar, std::span<const PaperSample> samples,
-                  std::span<const PlacedSample> places) {
+/// free.
+double unevenness(std::span<const double> direct, double ambient, std::span<const PaperSample> samples) {
   std::vector<double> logs;
   std::map<int, std::vector<double>> by_sheet;
   for (std::size_t k = 0; k < samples.size(); ++k) {
-    const auto& [spot, reference] = places[k];
-    const double direct =
-        bar ? spot.irradiance(*bar) / reference.irradiance(*bar) : spot.towards_up / reference.towards_up;
-    logs.push_back(std::log(samples[k].light / std::max(direct + samples[k].glow, least_light)));
+    const double light = ambient + (1 - ambient) * std::max(direct[k] + samples[k].glow, least_light);
+    logs.push_back(std::log(samples[k].light / light));
     by_sheet[samples[k].sheet].push_back(logs.back());
   }
   std::map<int, double> levels;
@@ -86,6 +91,24 @@ double unevenness(const std::optional<LampBar>& bar, std::span<const PaperSample
     cost += off / (1 + off);
   }
   return cost / static_cast<double>(samples.size());
+}
+
+/// A light that is tried.
+struct Trial {
+  std::optional<LampBar> lamp;
+  double ambient = 0, cost = 1;
+};
+
+/// The best share of ambient light with this lamp.
+Trial try_ambient(const std::optional<LampBar>& lamp, const std::optional<double>& ambient,
+                  std::span<const PlacedSample> places, std::span<const PaperSample> samples) {
+  constexpr std::array shares{0., 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.};
+  const std::vector<double> direct = light_on(places, lamp);
+  if (ambient) return {lamp, *ambient, unevenness(direct, *ambient, samples)};
+  Trial best{lamp};
+  for (const double share : shares)
+    if (const double cost = unevenness(direct, share, samples); cost < best.cost) best = {lamp, share, cost};
+  return best;
 }
 
 bool has_relief(std::span<const PaperSample> samples) {
@@ -114,11 +137,14 @@ double LampLight::irradiance(const Eigen::Vector3d& point, const Eigen::Vector3d
 
 double LampLight::at(const Eigen::Vector3d& point_mm, const Eigen::Vector3d& normal,
                      const Eigen::Vector3d& at_reference_mm) const {
-  return irradiance(point_mm, normal) / irradiance(at_reference_mm, Eigen::Vector3d::UnitZ());
+  const double ambient = light_->ambient.value_or(0);
+  return ambient + (1 - ambient) * irradiance(point_mm, normal) / irradiance(at_reference_mm, Eigen::Vector3d::UnitZ());
 }
 
-std::optional<LampBar> find_lamp(const ScanLight& light, std::span<const PaperSample> samples) {
-  if (samples.size() < least_samples || !has_relief(samples)) return std::nullopt;
+ScanLight find_light(ScanLight light, std::span<const PaperSample> samples) {
+  const std::optional<double> known_ambient = light.ambient;
+  light.ambient = known_ambient.value_or(0);
+  if (samples.size() < least_samples || (light.lamp && known_ambient)) return light;
   constexpr std::array heights{200., 250., 300., 350., 400., 450., 500., 600., 700., 850., 1000., 1300., 2000., 4000.};
   constexpr std::array lengths{50., 200., 300., 400., 500., 600., 800., 1200.};
   const LampLight from_afar(light);
@@ -126,16 +152,21 @@ std::optional<LampBar> find_lamp(const ScanLight& light, std::span<const PaperSa
   for (const PaperSample& sample : samples)
     places.push_back({{from_afar.frame_at(sample.point_mm), sample.point_mm, sample.normal},
                       {from_afar.frame_at(sample.at_reference_mm), sample.at_reference_mm, Eigen::Vector3d::UnitZ()}});
-  const auto bar_of = [&](std::size_t k) {
-    return LampBar{heights[k / lengths.size()], lengths[k % lengths.size()], 0};
-  };
-  std::vector<double> costs(heights.size() * lengths.size());
-  parallel_rows(static_cast<int>(costs.size()), [&](int k) {
-    costs[static_cast<std::size_t>(k)] = unevenness(bar_of(static_cast<std::size_t>(k)), samples, places);
+
+  std::vector<Trial> trials{{light.lamp}};
+  if (!light.lamp && has_relief(samples))
+    for (const double height : heights)
+      for (const double length : lengths) trials.push_back({LampBar{height, length, 0}});
+  parallel_rows(static_cast<int>(trials.size()), [&](int k) {
+    Trial& trial = trials[static_cast<std::size_t>(k)];
+    trial = try_ambient(trial.lamp, known_ambient, places, samples);
   });
-  const auto best = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
-  if (!(costs[best] < (1 - least_gain) * unevenness(std::nullopt, samples, places))) return std::nullopt;
-  return bar_of(best);
+  const Trial& best = *std::ranges::min_element(trials, {}, &Trial::cost);
+  const double usual = unevenness(light_on(places, light.lamp), *light.ambient, samples);
+  if (!(best.cost < (1 - least_gain) * usual)) return light;
+  light.lamp = best.lamp;
+  light.ambient = best.ambient;
+  return light;
 }
 
 }  // namespace pagesweep

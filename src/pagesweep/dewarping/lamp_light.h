@@ -16,6 +16,9 @@ struct ScanLight {
   std::optional<LampBar> lamp{};
   std::optional<WhiteReference> white{};  ///< missing: the scanner has evened its picture out over the table, z = 0
   double stripe_fwhm_mm = 12;             ///< width of the lit stripe on the table
+  /// Share of the light that comes from all around and falls alike on every slope: 1 where the scan is not a picture of
+  /// the stripe's light, or was evened out already. Missing: to be found.
+  std::optional<double> ambient{};
 };
 
 /// The directions of light at a place: unit vectors of the rig frame.
@@ -30,7 +33,7 @@ struct LightFrame {
 /// A bar of length L that sends light out as a matt surface does gives a spot at X with normal n
 ///     E = integral over x' of (n . r)(D / |r|) / |r|^3 dx',   r = D up + x' along,
 /// with D the distance from the bar; the integral is known in closed form (docs/derivations/dewarping.md). Without a
-/// known bar the light is taken to come from afar, E = n . up.
+/// known bar the light is taken to come from afar, E = n . up. Ambient light adds its share, the same everywhere.
 class LampLight {
  public:
   explicit LampLight(const ScanLight& light) : light_(&light) {}
@@ -54,9 +57,11 @@ struct PaperSample {
   int sheet = 0;     ///< which piece of paper: each has its own colour
 };
 
-/// Where a lamp must be whose light makes each sheet's blank paper most even: height and length of the bar, by the
-/// least sum of Geman and McClure's robust cost on a grid of both. Nothing if paper lies too level to tell, or if the
-/// lamp that is found explains little more than light from afar does.
-std::optional<LampBar> find_lamp(const ScanLight& light, std::span<const PaperSample> samples);
+/// The light that makes each sheet's blank paper most even: the lamp's height and length, if `light` does not tell
+/// them, and how much of the light is ambient, by the least sum of Geman and McClure's robust cost on a grid of all
+/// three. Light from afar without any ambient light is what it has to explain better, clearly; a lamp can be told only
+/// where paper does not lie level.
+/// \return `light` with what was found; with no ambient light where nothing shows any
+ScanLight find_light(ScanLight light, std::span<const PaperSample> samples);
 
 }  // namespace pagesweep

@@ -15,6 +15,7 @@ namespace {
 constexpr double ease_mm = 15;
 constexpr double model_noise_mm = 0.02;
 constexpr double least_cover_mm = 0.3;
+constexpr double mixed_cells = 2;  // from the gutter: as far as a cell there, and its pixels' spots, reach over it
 
 Support support_of(const HeightField& field, const CellMean& cell, int i, int j) {
   Support place;
@@ -77,8 +78,9 @@ void find_cover(const RuledSurface& model, Differences& differences) {
   parallel_rows(field.rows(), [&](int j) {
     for (int i = 0; i < field.columns(); ++i) {
       if (differences.known(i, j) || !std::isfinite(field.z(i, j))) continue;
-      const double sheet =
-          model.height({field.p_of(i), field.q_of(j)}) + differences.dz(differences.finer * i, differences.finer * j);
+      const Eigen::Vector2d plan(field.p_of(i), field.q_of(j));
+      if (std::abs(model.frame.ruling_from_plan(plan).x()) < differences.beside_gutter_mm) continue;
+      const double sheet = model.height(plan) + differences.dz(differences.finer * i, differences.finer * j);
       if (!(field.z(i, j) - sheet > least_cover_mm)) continue;
       differences.status(i, j) = PixelStatus::covered;
       differences.cover_mm(i, j) = static_cast<float>(field.z(i, j) - sheet);
@@ -173,7 +175,7 @@ std::vector<Support> places_of(const HeightField& field, const Image<CellMean>& 
 }
 
 Differences measure_differences(const HeightField& field, const Image<CellMean>& cells, const RuledSurface& model,
-                                double radius_mm) {
+                                double radius_mm, bool has_gutter) {
   Differences differences{&field,
                           1,
                           cells,
@@ -181,7 +183,8 @@ Differences measure_differences(const HeightField& field, const Image<CellMean>&
                           Image<double>(field.columns(), field.rows(), 0),
                           Image<float>(field.columns(), field.rows(), not_a_number),
                           field.status,
-                          Image<float>(field.columns(), field.rows(), not_a_number)};
+                          Image<float>(field.columns(), field.rows(), not_a_number),
+                          has_gutter ? mixed_cells * field.cell_mm : 0};
   Image<CellMean>& gaps = differences.gaps;
   for (int j = 0; j < field.rows(); ++j)
     for (int i = 0; i < field.columns(); ++i) {

@@ -186,7 +186,8 @@ PageSurface sample(const FlatPage& flat, const HeightField& field, SurfaceModel 
 double strained_share(const FlatPage& flat) { return flat.strain().share_beyond(strain_that_matters); }
 
 PageSurface finish_page(const FittedPage& fitted, const HeightField& field, const SurfaceOptions& options) {
-  const Differences differences = measure_differences(field, fitted.cells, fitted.model, options.neighbourhood_mm);
+  const Differences differences = measure_differences(field, fitted.cells, fitted.model, options.neighbourhood_mm,
+                                                      fitted.gutter != GutterSide::none);
   const FlatPage by_model(fitted.model, differences, fitted.places, fitted.gutter);
   // Dents of the paper and the rims of the measurement strain a good cylinder as well, in a few places.
   const bool may_follow = options.model == SurfaceModel::developable ||
