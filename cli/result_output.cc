@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "cli/exit_code.h"
@@ -82,14 +83,17 @@ std::vector<CameraReport> cameras_of(const RunResult& result) {
     if (measurement.timing) {
       camera.times = &measurement.timing->maps[c];
       camera.figures = figures_of(measurement.timing->noise[c], camera.name);
-      if (c < result.sequences.size())
-        add_figures(camera.figures,
-                    advise_exposure(result.sequences[c], measurement.timing->maps[c], measurement.clipped_frames[c],
-                                    measurement.timing->profile),
-                    camera.name);
+      if (c < result.sequences.size()) {
+        const ExposureAdvice advice = advise_exposure(result.sequences[c], measurement.timing->maps[c],
+                                                      measurement.clipped_frames[c], measurement.timing->profile);
+        add_figures(camera.figures, advice, camera.name);
+        camera.exposure = describe(advice);
+      }
     }
     if (c < measurement.edges.size()) add_figures(camera.figures, measurement.edges[c], camera.name);
     if (c < measurement.fusion.size()) add_figures(camera.figures, measurement.fusion[c], camera.name);
+    std::ranges::copy_if(result.figures, std::back_inserter(camera.figures),
+                         [&](const Figure& figure) { return figure.group == camera.name; });
     cameras.push_back(std::move(camera));
   }
   return cameras;
@@ -107,7 +111,9 @@ ReportInputs inputs_of(const RunResult& result, std::span<const PageQuality> qua
   }
   if (const auto& sweep = result.measurement.sweep)
     for (Figure& figure : figures_of(*sweep)) inputs.figures.push_back(std::move(figure));
-  inputs.figures.insert(inputs.figures.end(), result.figures.begin(), result.figures.end());
+  std::ranges::copy_if(result.figures, std::back_inserter(inputs.figures), [&](const Figure& figure) {
+    return std::ranges::find(inputs.cameras, figure.group, &CameraReport::name) == inputs.cameras.end();
+  });
   inputs.surfaces = result.surfaces;
   inputs.pages = result.pages;
   inputs.quality = quality;

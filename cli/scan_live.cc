@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <exception>
+#include <functional>
 #include <optional>
 
 #include "cli/console_progress.h"
@@ -71,9 +72,9 @@ struct Readiness {
   double points = 0;
 };
 
-/// Points, with what the scan tells of the print, if it comes.
+/// Points, with what the scan tells of the print, if it comes. If there are none, the recording is kept all the same.
 Measurement measure(WatchedSource& source, LatePicture& late_picture, const Rig& rig, const ScanOptions& options,
-                    Progress& progress, Readiness& ready) {
+                    QuietSweep& progress, Readiness& ready, const std::function<void()>& keep_recording) {
   std::optional<Picture> none;  // of the scan's size: whatever is looked up in it tells nothing
   const ScanSource scan = [&]() -> const Picture& {
     if (!ready.without_scan) ready.without_scan = source.seconds_since_last_frame();
@@ -83,9 +84,14 @@ Measurement measure(WatchedSource& source, LatePicture& late_picture, const Rig&
     if (!none) none = make_picture(rig.scanner->width(), rig.scanner->height(), 1, 8);
     return *none;
   };
-  Measurement measurement = reconstruct(source, rig, options, progress, scan);
-  ready.points = source.seconds_since_last_frame();
-  return measurement;
+  try {
+    Measurement measurement = reconstruct(source, rig, options, progress, scan);
+    ready.points = source.seconds_since_last_frame();
+    return measurement;
+  } catch (const Error&) {
+    if (source.has_begun()) keep_recording();
+    throw;
+  }
 }
 
 /// Pages, if some are found. What was measured stays either way: the sweep cannot be done again.
@@ -133,12 +139,29 @@ std::vector<Figure> figures_of(const Readiness& ready, const LiveStatus& status)
   return figures;
 }
 
-void warn(const LiveView& view, const LiveStatus& status, ConsoleProgress& console) {
+/// Why something is less than it should be; empty: it is not.
+struct Problems {
+  std::string sweep, picture, recording;
+  std::string of_result() const { return join_problems(sweep, picture); }
+};
+
+void warn(const Problems& problems, const LiveView& view, const LiveStatus& status, ConsoleProgress& console) {
+  if (!problems.picture.empty()) console.warn("partial: " + problems.picture);
+  if (!problems.recording.empty()) console.warn("the recording is partial: " + problems.recording);
   for (const std::string& remark : view.remarks()) console.warn(remark);
   for (const auto& camera : status.cameras) {
     const FrameCounts& counts = camera.counts;
     if (counts.damaged + counts.lost + counts.unpaired + counts.late > 0) console.warn(describe(camera));
   }
+}
+
+/// Fails if something was missing, now that all is written.
+void end(const Problems& problems, const std::exception_ptr& no_pages, const LiveScan& arguments) {
+  if (!problems.of_result().empty())
+    throw pagesweep::cannot_read(arguments.output, "the result is partial: " + problems.of_result());
+  if (no_pages) std::rethrow_exception(no_pages);
+  if (!problems.recording.empty())
+    throw pagesweep::cannot_write(arguments.record, "the recording is partial: " + problems.recording);
 }
 
 void check(const LiveScan& arguments, const Rig& rig) {
@@ -169,25 +192,22 @@ void scan_live(const LiveScan& arguments) {
   ScanOptions options = arguments.options;
   options.on_points = [&view](const PointMap& points) { view.show(points); };
 
+  const auto record = [&] {
+    if (recording)
+      recording->finish(rig, late_picture.get(), join_problems(live.ended_early(), late_picture.problem()));
+  };
+
   Readiness ready;
   Scan scan;
-  try {
-    scan.measurement = measure(source, late_picture, rig, options, progress, ready);
-  } catch (const Error&) {
-    if (recording && source.has_begun()) recording->finish(rig, late_picture.get(), live.ended_early());
-    throw;
-  }
+  scan.measurement = measure(source, late_picture, rig, options, progress, ready, record);
   const LiveStatus status = live.status();
   view.finish(status);
   if (!arguments.common.quiet) tell(ready);
   const Picture* picture = late_picture.get();
-  const std::string problem = join_problems(live.ended_early(), late_picture.problem());
-  if (recording) recording->finish(rig, picture, problem);
-  if (!late_picture.problem().empty()) console.warn("partial: " + late_picture.problem());
-  const std::string not_recorded = recording ? recording->trouble() : "";
-  if (!not_recorded.empty()) console.warn("the recording is partial: " + not_recorded);
+  record();
+  const Problems problems{live.ended_early(), late_picture.problem(), recording ? recording->trouble() : ""};
   const std::exception_ptr no_pages = picture ? flatten(scan, *picture, rig, options, progress) : nullptr;
-  warn(view, status, console);
+  warn(problems, view, status, console);
   write_scan(output,
              {.title = arguments.output.filename().string(),
               .sequences = live.sequences(),
@@ -198,9 +218,7 @@ void scan_live(const LiveScan& arguments) {
               .fail_on = arguments.quality.fail_on,
               .figures = figures_of(ready, status)},
              console, arguments.common);
-  if (!problem.empty()) throw pagesweep::cannot_read(arguments.output, "the result is partial: " + problem);
-  if (no_pages) std::rethrow_exception(no_pages);
-  if (!not_recorded.empty()) throw pagesweep::cannot_write(recording->path(), "it is partial: " + not_recorded);
+  end(problems, no_pages, arguments);
 }
 
 }  // namespace pagesweep::cli

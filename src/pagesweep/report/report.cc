@@ -45,6 +45,7 @@ Json to_json(const CameraReport& camera) {
   }
   if (camera.times) json["times"] = to_json(count_status(camera.times->status));
   if (!camera.figures.empty()) json["figures"] = to_json(camera.figures);
+  if (!camera.exposure.empty()) json["exposure"] = utf8(camera.exposure);
   return json;
 }
 

@@ -57,6 +57,7 @@ struct CameraReport {
   const TimeMap* times = nullptr;    ///< may be absent
   const PointMap* points = nullptr;  ///< may be absent
   std::vector<Figure> figures;       ///< anything else worth knowing: the sensor's noise, ...
+  std::string exposure = {};         ///< how well it was exposed, and what would be better; empty: not known
 };
 
 /// Light of the stripe over time at one spot.

@@ -305,11 +305,19 @@ std::string format_value(const OptionValue& option) {
       option.value);
 }
 
+std::string format_exposure(const ReportInputs& inputs) {
+  std::string lines;
+  for (const CameraReport& camera : inputs.cameras)
+    if (!camera.exposure.empty())
+      lines += fmt::format("<li>{}: {}.</li>\n", escape_html(camera.name), escape_html(camera.exposure));
+  return lines.empty() ? "" : "<h3>Exposure</h3>\n<ul>" + lines + "</ul>\n";
+}
+
 std::string format_details(const ReportInputs& inputs) {
   std::vector<Figure> figures = inputs.figures;
   for (const CameraReport& camera : inputs.cameras)
     figures.insert(figures.end(), camera.figures.begin(), camera.figures.end());
-  std::string html = format_figures(figures);
+  std::string html = format_exposure(inputs) + format_figures(figures);
   if (!inputs.times.empty()) {
     html += "<h3>Time taken</h3>\n<table>";
     for (const StationTime& time : inputs.times)

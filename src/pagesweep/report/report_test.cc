@@ -189,6 +189,16 @@ TEST_F(ReportTest, JsonTellsTheSame) {
   EXPECT_EQ(report["figures"]["stripe"]["speed"]["reason"], "the rig does not tell");
 }
 
+TEST_F(ReportTest, TellsHowEachCameraWasExposed) {
+  Book book;
+  write_report(folder_, book.inputs);
+  EXPECT_FALSE(json()["cameras"][1].contains("exposure"));
+  book.inputs.cameras[1].exposure = "take <less> of the light";
+  write_report(folder_, book.inputs);
+  EXPECT_EQ(json()["cameras"][1]["exposure"], "take <less> of the light");
+  EXPECT_THAT(html(), HasSubstr("<li>" + book.rig.cameras[1].name + ": take &lt;less&gt; of the light.</li>"));
+}
+
 TEST_F(ReportTest, TellsEachPagesQualityAndItsVerdict) {
   Book book;
   std::vector<PageQuality> quality(2);
