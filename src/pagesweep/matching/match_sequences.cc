@@ -57,8 +57,9 @@ struct Seeker {
   double energy = 0;                         ///< of its sequence, in the store's own units
   std::vector<std::int32_t> pixels, scores;  ///< of the curve's places, see ScoredCurve
   std::vector<CurveMinimum> minima;
-  std::span<const CurveMinimum> promising;  ///< the best ones of the minima, in order
-  std::size_t next = 0;                     ///< of the minima
+  std::span<CurveMinimum> unseen;     ///< minima that are neither fitted nor improved
+  std::span<CurveMinimum> promising;  ///< improved, and in order
+  std::size_t next = 0;               ///< of the promising ones
   SequenceFit best;
   bool has_best = false;
   int place_of_best = 0;
@@ -117,6 +118,15 @@ class SequenceFinder final : public MatchFinder {
   static constexpr double across = 0.15, along = 0.15;
 
   void seek(int x, int y, const EpipolarCurve& curve);
+  ScoredCurve scored(const Seeker& seeker) const {
+    return {&to_arrays_,
+            seeker.pixels.data(),
+            seeker.scores.data() + score_padding,
+            seeker.curve.line.count,
+            from_.square(seeker.x, seeker.y),
+            affine_};
+  }
+  void improve_others(Seeker& seeker) const;
   void decide();
   void hear(const SequenceFit& fit, Seeker& seeker) const;
   Match judge(const Seeker& seeker) const;
@@ -136,7 +146,6 @@ class SequenceFinder final : public MatchFinder {
 
 /// Compares with the pixels nearest to the curve, and notes the most promising places.
 void SequenceFinder::seek(int x, int y, const EpipolarCurve& curve) {
-  constexpr std::size_t most = 8;
   Seeker& seeker = seekers_[curves_.size()];
   curves_.push_back(curve);
   seeker.x = x;
@@ -152,11 +161,31 @@ void SequenceFinder::seek(int x, int y, const EpipolarCurve& curve) {
                                    seeker.pixels.data(), scores);
   constexpr double largest = std::numeric_limits<std::int32_t>::max();
   const double limit = std::min(least, options_.max_dissimilarity * seeker.energy) + (across + along) * seeker.energy;
-  const ScoredCurve scored{&to_arrays_, seeker.pixels.data(), scores, count, from_.square(x, y), affine_};
-  const int minima = find_minima(scored, static_cast<std::int32_t>(std::min(limit, largest)), seeker.minima.data());
+  const int minima =
+      find_minima(scored(seeker), static_cast<std::int32_t>(std::min(limit, largest)), seeker.minima.data());
   const auto found = std::span(seeker.minima).first(static_cast<std::size_t>(minima));
-  std::ranges::sort(found, {}, &CurveMinimum::distance_squared);
-  seeker.promising = found.first(std::min(found.size(), most));
+  constexpr std::size_t at_first = 2;
+  seeker.promising = found.first(std::min(found.size(), at_first));
+  seeker.unseen = found.subspan(seeker.promising.size());
+  if (!seeker.unseen.empty())
+    std::ranges::partial_sort(found, seeker.unseen.begin(), {}, &CurveMinimum::distance_squared);
+  improve_minima(scored(seeker), seeker.promising);
+  std::ranges::sort(seeker.promising, {}, &CurveMinimum::distance_squared);
+}
+
+/// When the first places left the verdict open: which of the others may lead.
+void SequenceFinder::improve_others(Seeker& seeker) const {
+  constexpr std::size_t most = 6;
+  auto others = std::exchange(seeker.unseen, {});
+  if (seeker.has_best) {
+    const double limit = seeker.best.distance_squared + (across + along) * seeker.energy;
+    const auto beyond = std::ranges::partition(others, [&](const auto& m) { return m.distance_squared <= limit; });
+    others = others.first(others.size() - beyond.size());
+  }
+  improve_minima(scored(seeker), others);
+  std::ranges::sort(others, {}, &CurveMinimum::distance_squared);
+  seeker.promising = others.first(std::min(others.size(), most));
+  seeker.next = 0;
 }
 
 /// In rounds: fits each seeker's most promising place, until a verdict is found or no other place can change it.
@@ -165,6 +194,7 @@ void SequenceFinder::decide() {
   for (asked_for_.clear();; asked_for_.clear()) {
     for (Seeker& seeker : seekers) {
       if (seeker.verdict) continue;
+      if (!seeker.unseen.empty() && !seeker.has_more(across)) improve_others(seeker);
       if (seeker.has_more(across)) {
         const auto index = static_cast<std::size_t>(&seeker - seekers_.data());
         const double depth = seeker.curve.inverse_depth(seeker.promising[seeker.next++].place);

@@ -192,10 +192,16 @@ int FindMinima(const ScoredCurve& curve, std::int32_t limit, CurveMinimum* minim
     if (hn::AllFalse(integers, is_minimum)) continue;
     std::uint8_t bytes[8] = {};
     hn::StoreMaskBits(integers, is_minimum, bytes);
-    for (unsigned bits = bytes[0] | static_cast<unsigned>(bytes[1]) << 8; bits != 0; bits &= bits - 1)
-      minima[found++] = improve(curve, first + std::countr_zero(bits));
+    for (unsigned bits = bytes[0] | static_cast<unsigned>(bytes[1]) << 8; bits != 0; bits &= bits - 1) {
+      const int place = first + std::countr_zero(bits);
+      minima[found++] = {static_cast<float>(place), static_cast<float>(curve.scores[place])};
+    }
   }
   return found;
+}
+
+void ImproveMinima(const ScoredCurve& curve, std::span<CurveMinimum> minima) {
+  for (CurveMinimum& minimum : minima) minimum = improve(curve, static_cast<int>(minimum.place));
 }
 
 template <class D>
@@ -329,6 +335,7 @@ namespace pagesweep {
 HWY_EXPORT(PackSequences);
 HWY_EXPORT(ScoreCurve);
 HWY_EXPORT(FindMinima);
+HWY_EXPORT(ImproveMinima);
 HWY_EXPORT(Multiply);
 HWY_EXPORT(SumResiduals);
 
@@ -344,6 +351,10 @@ std::int32_t score_curve(const SequenceArrays& to, const LensNumbers& lens, cons
 
 int find_minima(const ScoredCurve& curve, std::int32_t limit, CurveMinimum* minima) {
   return HWY_DYNAMIC_DISPATCH(FindMinima)(curve, limit, minima);
+}
+
+void improve_minima(const ScoredCurve& curve, std::span<CurveMinimum> minima) {
+  HWY_DYNAMIC_DISPATCH(ImproveMinima)(curve, minima);
 }
 
 CrossingProducts multiply(const Crossing* crossings, const std::int16_t* own, int length) {

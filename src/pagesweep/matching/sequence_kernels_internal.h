@@ -65,8 +65,8 @@ std::int32_t score_curve(const SequenceArrays& to, const LensNumbers& lens, cons
 
 /// A place on a curve that may be the match.
 struct CurveMinimum {
-  float place;             ///< among those of the curve; a fraction
-  float distance_squared;  ///< there, linearly interpolated between the nearest pixels
+  float place;             ///< among those of the curve; once improved, a fraction
+  float distance_squared;  ///< there, of the nearest pixel; once improved, interpolated between the two nearest
 };
 
 /// What score_curve() found. The entry before the first score is higher than any, and those behind the last are filled
@@ -80,11 +80,13 @@ struct ScoredCurve {
   bool affine;  ///< see Normalisation
 };
 
-/// The places whose scores are at most `limit`, lower than the one before and not higher than the one behind, each
-/// improved by interpolating towards the better one of its neighbours.
+/// The places whose scores are at most `limit`, lower than the one before and not higher than the one behind.
 /// \param minima  room for half of count, rounded up
 /// \return how many there are
 int find_minima(const ScoredCurve& curve, std::int32_t limit, CurveMinimum* minima);
+
+/// Interpolates linearly towards the better one of each minimum's neighbours.
+void improve_minima(const ScoredCurve& curve, std::span<CurveMinimum> minima);
 
 /// A sequence between two pixels.
 struct Crossing {

@@ -119,6 +119,11 @@ TEST_P(SequenceKernels, MinimaAreThoseOfTheScoresAndNearerThanThem) {
     const ScoredCurve curve{&to, pixels.data(), first, count, all_squares[2], false};
     ASSERT_EQ(find_minima(curve, limit, minima.data()), static_cast<int>(expected.size()));
     for (std::size_t i = 0; i < expected.size(); ++i) {
+      EXPECT_EQ(minima[i].place, static_cast<float>(expected[i]));
+      EXPECT_EQ(minima[i].distance_squared, static_cast<float>(first[expected[i]]));
+    }
+    improve_minima(curve, std::span(minima).first(expected.size()));
+    for (std::size_t i = 0; i < expected.size(); ++i) {
       const auto [place, distance_squared] = minima[i];
       EXPECT_LE(std::abs(place - static_cast<float>(expected[i])), 1);
       const int low = std::min(static_cast<int>(place), count - 2);
