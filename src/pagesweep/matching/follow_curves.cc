@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/matching/follow_curves.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 
@@ -174,24 +175,102 @@ void FollowCurves(CurveBatch& batch) {
   }
 }
 
+/// Places on one curve, a stretch of them at a time.
+class CurveSearch {
+ public:
+  static constexpr std::size_t stretch = 16, chunk = most_curves;  ///< places, stretches
+
+  CurveSearch(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step)
+      : curves_(batch, direction, time), times_(batch.times), time_(time), first_(first), step_(step) {}
+
+  /// Looks closely where the time may be that is looked for, and beside it, and else nowhere.
+  bool operator()(std::span<float> ahead) {
+    bool seen = false, before = false;
+    const std::size_t stretches = (ahead.size() + stretch - 1) / stretch;
+    for (std::size_t i = 0; i < stretches; i += chunk) {
+      // One stretch before and one behind, whose neighbours must be known.
+      look_over(i);
+      seen = seen || any_seen_;
+      for (std::size_t k = 0; k < chunk && i + k < stretches; ++k) {
+        const bool close = before || promising_[k] || promising_[k + 1];
+        before = promising_[k];
+        const auto part = ahead.subspan((i + k) * stretch, std::min(stretch, ahead.size() - (i + k) * stretch));
+        if (close) {
+          seen = compare((i + k) * stretch, part) || seen;
+        } else {
+          std::ranges::fill(part, std::numeric_limits<float>::quiet_NaN());
+        }
+      }
+    }
+    return seen;
+  }
+
+ private:
+  Curves::Place place_at(std::size_t k, float stride) const {
+    const Vector steps = hn::MulAdd(hn::Iota(Floats(), 0), set(stride), set(static_cast<float>(k)));
+    return curves_.at(hn::MulAdd(steps, set(step_), set(first_)));
+  }
+
+  /// Which of the stretches first ... first + chunk may have the time.
+  void look_over(std::size_t first) {
+    constexpr std::size_t ends = chunk + 2, room = ends + most_curves;
+    HWY_ALIGN float u[room], v[room];
+    const Vector unseen = no_number();
+    any_seen_ = false;
+    for (std::size_t k = 0; k < ends; k += hn::Lanes(Floats())) {
+      const auto place = place_at((first + k) * stretch, static_cast<float>(stretch));
+      any_seen_ = any_seen_ || !hn::AllFalse(Floats(), place.seen);
+      hn::StoreU(hn::IfThenElse(place.seen, place.u, unseen), Floats(), u + k);
+      hn::StoreU(hn::IfThenElse(place.seen, place.v, unseen), Floats(), v + k);
+    }
+    for (std::size_t k = 0; k <= chunk; ++k) promising_[k] = may_have_time(u[k], v[k], u[k + 1], v[k + 1]);
+  }
+
+  /// \param u, v  of a stretch's ends; NaN: unseen
+  bool may_have_time(float u0, float v0, float u1, float v1) const {
+    const auto [left, right] = std::minmax(u0, u1);
+    const auto [top, bottom] = std::minmax(v0, v1);
+    if (!(right - left + bottom - top >= 0)) return true;
+    // A pixel for the bending of the curve.
+    const int rows = (times_.height + time_block_px - 1) / time_block_px;
+    const auto block = [](float p, int blocks) {
+      return std::clamp(static_cast<int>(p) / time_block_px, 0, blocks - 1);
+    };
+    const int first_column = block(left - 1, times_.blocks), last_column = block(right + 1, times_.blocks);
+    const int first_row = block(top - 1, rows), last_row = block(bottom + 1, rows);
+    constexpr float rounding = 1e-3f;  // [frames]
+    for (int row = first_row; row <= last_row; ++row)
+      for (int column = first_column; column <= last_column; ++column) {
+        const int index = row * times_.blocks + column;
+        if (times_.earliest[index] <= time_ + rounding && times_.latest[index] >= time_ - rounding) return true;
+      }
+    return false;
+  }
+
+  /// \return whether any of these places is seen
+  bool compare(std::size_t first, std::span<float> ahead) const {
+    const Floats d;
+    bool seen = false;
+    HWY_ALIGN float differences[stretch + most_curves];
+    for (std::size_t k = 0; k < ahead.size(); k += hn::Lanes(d)) {
+      const auto place = place_at(first + k, 1);
+      seen = seen || !hn::AllFalse(d, place.seen);
+      hn::StoreU(curves_.ahead(place), d, differences + k);
+    }
+    std::copy_n(differences, ahead.size(), ahead.begin());
+    return seen;
+  }
+
+  Curves curves_;
+  const TimeArrays& times_;
+  float time_, first_, step_;
+  bool any_seen_ = false;
+  std::array<bool, chunk + 1> promising_{};
+};
+
 bool SearchCurve(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,
                  std::span<float> ahead) {
-  const Floats d;
-  const Curves curves(batch, direction, time);
-  bool seen = false;
-  for (std::size_t k = 0; k < ahead.size(); k += hn::Lanes(d)) {
-    const auto place = curves.at(hn::MulAdd(hn::Iota(d, static_cast<float>(k)), set(step), set(first)));
-    seen = seen || !hn::AllFalse(d, place.seen);
-    const Vector difference = curves.ahead(place);
-    if (k + hn::Lanes(d) <= ahead.size()) {
-      hn::StoreU(difference, d, &ahead[k]);
-    } else {
-      HWY_ALIGN float rest[most_curves];
-      hn::Store(difference, d, rest);
-      for (std::size_t i = k; i < ahead.size(); ++i) ahead[i] = rest[i - k];
-    }
-  }
-  return seen;
+  return CurveSearch(batch, direction, time, first, step)(ahead);
 }
 
 }  // namespace pagesweep::HWY_NAMESPACE

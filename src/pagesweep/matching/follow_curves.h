@@ -10,6 +10,10 @@ namespace pagesweep {
 
 inline constexpr int most_curves = 16;  ///< followed at once; the longest vector
 
+/// Side of the squares of pixels whose times are bounded together, with the pixels right of and below them: all that a
+/// time is interpolated from.
+inline constexpr int time_block_px = 16;
+
 /// A time map to be asked between its pixels, as arrays. Rows follow each other without gaps.
 struct TimeArrays {
   const float* time;       ///< [frames]
@@ -17,6 +21,9 @@ struct TimeArrays {
   const float* amplitude;  ///< [gray values]
   const float* between;    ///< 0 where times may be interpolated between (x, y) and (x + 1, y + 1), NaN where not
   int width, height;       ///< [px] at least 2
+  const float* earliest;   ///< [frames] of a block's pixels; no less than any number where it has none
+  const float* latest;     ///< [frames] likewise, no more than any number
+  int blocks;              ///< in a row of the picture
 };
 
 /// The camera that is looked into.
@@ -54,7 +61,8 @@ struct CurveBatch {
 void follow_curves(CurveBatch& batch);
 
 /// How far the other camera's time is ahead of `time` at the inverse depths first + k step of one curve; NaN where it
-/// has no time or does not see. Of the batch, only what is the same for all pixels is read.
+/// has no time or does not see, and far from where the times are equal. Of the batch, only what is the same for all
+/// pixels is read.
 /// \param direction  of the pixel, in the other camera's frame
 /// \return whether the other camera sees any of these places
 bool search_curve(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,

@@ -13,6 +13,9 @@ namespace pagesweep {
 namespace {
 
 constexpr std::uint8_t right = 1, below = 2;
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+int blocks_over(int pixels) { return (pixels + time_block_px - 1) / time_block_px; }
 
 /// Whether pixel (x, y) and the one at (x + dx, y + dy) are of one surface.
 bool are_linked(const TimeMap& map, int x, int y, int dx, int dy) {
@@ -64,13 +67,18 @@ std::vector<Columns> around(const PixelSet* set, int width, int height, int reac
 
 }  // namespace
 
-TimeField::TimeField(int width, int height) : linked_(width, height), between_(width, height, not_a_number) {}
+TimeField::TimeField(int width, int height)
+    : linked_(width, height),
+      earliest_(blocks_over(width), blocks_over(height), infinity),
+      latest_(blocks_over(width), blocks_over(height), -infinity),
+      between_(width, height, not_a_number) {}
 
 TimeField::TimeField(const TimeMap& map) : TimeField(map.width(), map.height()) { update(map, nullptr); }
 
 void TimeField::update(const TimeMap& map, const PixelSet* news) {
   map_ = &map;
   constexpr int reach = 3;  // [px] from a pixel whose link depends on another
+  bound_blocks(news);
   const auto to_link = around(news, map.width(), map.height(), reach);
   parallel_rows(map.height(), [&](int y) {
     const Columns& columns = to_link[static_cast<std::size_t>(y)];
@@ -90,9 +98,33 @@ void TimeField::update(const TimeMap& map, const PixelSet* news) {
   });
 }
 
+void TimeField::bound_blocks(const PixelSet* news) {
+  const auto columns = around(news, map_->width(), map_->height(), 1);
+  parallel_rows(earliest_.height(), [&](int row) {
+    const int top = row * time_block_px, bottom = std::min(top + time_block_px + 1, map_->height());
+    Columns new_ones;
+    for (int y = top; y < bottom; ++y) {
+      new_ones.begin = std::min(new_ones.begin, columns[static_cast<std::size_t>(y)].begin);
+      new_ones.end = std::max(new_ones.end, columns[static_cast<std::size_t>(y)].end);
+    }
+    for (int column = new_ones.begin / time_block_px; column < blocks_over(new_ones.end); ++column) {
+      const int left = column * time_block_px, width = std::min(time_block_px + 1, map_->width() - left);
+      float earliest = infinity, latest = -infinity;
+      for (int y = top; y < bottom; ++y)
+        for (const float time :
+             map_->time.row(y).subspan(static_cast<std::size_t>(left), static_cast<std::size_t>(width))) {
+          earliest = time < earliest ? time : earliest;  // passes over NaN
+          latest = time > latest ? time : latest;
+        }
+      earliest_(column, row) = earliest;
+      latest_(column, row) = latest;
+    }
+  });
+}
+
 TimeArrays TimeField::arrays() const {
-  return {map_->time.data(), map_->sigma.data(), map_->amplitude.data(),
-          between_.data(),   map_->width(),      map_->height()};
+  return {map_->time.data(), map_->sigma.data(), map_->amplitude.data(), between_.data(),  map_->width(),
+          map_->height(),    earliest_.data(),   latest_.data(),         earliest_.width()};
 }
 
 TimeField::Cell TimeField::cell_at(const Eigen::Vector2d& pixel) const {
