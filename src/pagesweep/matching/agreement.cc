@@ -53,11 +53,13 @@ bool is_confirmed(const Correspondences& matches, const Found& other, int x, int
   }
   if (found == 0) return out_of_view == 4;
   // With all four corners the steps cancel; one that is missing leaves up to a pixel of foreshortening in doubt.
-  const double doubt = found == 4 ? 0 : 0.5;
+  const double doubt = found == 4 ? 0 : 0.5, distance_squared = du * du + dv * dv;
+  const double least_tolerance = (max_px + doubt) * weights;
+  if (distance_squared <= least_tolerance * least_tolerance) return true;
   const double own_sigma = matches.sigma(x, y), their_sigma = sigma / weights;
   const double sigmas = 4 * std::sqrt(own_sigma * own_sigma + their_sigma * their_sigma);
   const double tolerance = (std::max(max_px, sigmas) + doubt) * weights;
-  return du * du + dv * dv <= tolerance * tolerance;
+  return distance_squared <= tolerance * tolerance;
 }
 
 void judge(const Found& there, const Found& back, double max_px, const PixelSet* only) {

@@ -48,7 +48,7 @@ class Curves {
     Mask seen;
   };
 
-  Place at(Vector w) const {
+  HWY_INLINE Place at(Vector w) const {
     const LensNumbers& lens = batch_.lens;
     const Vector z = along(2, w), scale = hn::Div(set(1), z);
     const Vector x = hn::Mul(along(0, w), scale), y = hn::Mul(along(1, w), scale);
@@ -77,15 +77,15 @@ class Curves {
   }
 
   /// How far the other camera's time is ahead of the pixel's; NaN where there is none.
-  Vector ahead(const Place& place) const {
+  HWY_INLINE Vector ahead(const Place& place) const {
     const Vector time = hn::Add(between(batch_.times.time, place), gather(batch_.times.between, place, 0));
     return hn::IfThenElse(place.seen, hn::Sub(time, time_), no_number());
   }
-  Vector ahead(Vector w) const { return ahead(at(w)); }
+  HWY_INLINE Vector ahead(Vector w) const { return ahead(at(w)); }
 
   Vector amplitude(const Place& place) const { return between(batch_.times.amplitude, place); }
 
-  Vector variance(const Place& place) const {
+  HWY_INLINE Vector variance(const Place& place) const {
     const Vector left = hn::Sub(set(1), place.right), up = hn::Sub(set(1), place.down);
     const int width = batch_.times.width;
     const auto part = [&](int offset, Vector weight) {
@@ -97,7 +97,7 @@ class Curves {
   }
 
   /// Inverse depth a pixel of the other picture, the lens taken as ideal.
-  Vector step(Vector w) const {
+  HWY_INLINE Vector step(Vector w) const {
     const Vector x = along(0, w), y = along(1, w), z = along(2, w);
     const auto& [bx, by, bz] = batch_.origin;
     const Vector du = hn::MulSub(set(bx), z, hn::Mul(x, set(bz))), dv = hn::MulSub(set(by), z, hn::Mul(y, set(bz)));
@@ -108,11 +108,13 @@ class Curves {
   Mask is_allowed(Vector w) const { return hn::And(hn::Ge(w, set(batch_.far)), hn::Le(w, set(batch_.near))); }
 
  private:
-  Vector along(std::size_t axis, Vector w) const { return hn::MulAdd(w, set(batch_.origin[axis]), direction_[axis]); }
-  static Vector gather(const float* values, const Place& place, int offset) {
+  HWY_INLINE Vector along(std::size_t axis, Vector w) const {
+    return hn::MulAdd(w, set(batch_.origin[axis]), direction_[axis]);
+  }
+  static HWY_INLINE Vector gather(const float* values, const Place& place, int offset) {
     return hn::GatherIndex(Floats(), values + offset, place.cell);
   }
-  Vector between(const float* values, const Place& place) const {
+  HWY_INLINE Vector between(const float* values, const Place& place) const {
     const int width = batch_.times.width;
     const Vector a = gather(values, place, 0), b = gather(values, place, 1);
     const Vector c = gather(values, place, width), d = gather(values, place, width + 1);
@@ -126,7 +128,7 @@ class Curves {
 };
 
 /// The depth where the times are equal; NaN where secants do not lead there.
-Vector find_root(const Curves& curves, Vector expected) {
+HWY_INLINE Vector find_root(const Curves& curves, Vector expected) {
   const Floats d;
   const Vector step = curves.step(expected), precise = hn::Mul(set(1e-3f), step);
   Vector before = expected, at_before = curves.ahead(before);

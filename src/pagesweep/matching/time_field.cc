@@ -31,7 +31,7 @@ bool are_linked(const TimeMap& map, int x, int y, int dx, int dy) {
   const float left = std::fmin(std::abs(here - time(-1)), std::abs(time(-1) - time(-2)));
   const float rest = std::fmin(std::abs(time(2) - next), std::abs(time(3) - time(2)));
   const float around = std::fmax(left, rest);
-  if (!(around >= 0)) return true;
+  if (!(around >= 0) || difference <= 3 * around) return true;
   const float noise = std::hypot(map.sigma(x, y), map.sigma(x + dx, y + dy));
   return difference <= 3 * around + 6 * noise;
 }
