@@ -1,79 +1,79 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/triangulation/triangulate.h"
 
-#include <Eigen/Geometry>
-#include <cmath>
-#include <optional>
+#include <array>
 #include <stdexcept>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/triangulation/ray_batch_internal.h"
 
 namespace pagesweep {
 namespace {
 
-/// A point on the first of two lines, where the second passes nearest.
-struct Meeting {
-  double distance_mm;  ///< from the first line's origin, along its direction
-  double gap_mm;       ///< between the lines
-};
-
-/// \return  nothing if the lines are parallel or do not meet in front of both origins
-std::optional<Meeting> meet(const Ray& first, const Ray& second) {
-  const Eigen::Vector3d baseline = second.origin - first.origin;
-  const double cosine = first.direction.dot(second.direction);
-  const double sine_squared = 1 - cosine * cosine;
-  if (!(sine_squared > 1e-12)) return std::nullopt;
-  const double along_first = first.direction.dot(baseline), along_second = second.direction.dot(baseline);
-  const double s = (along_first - cosine * along_second) / sine_squared;
-  const double t = (cosine * along_first - along_second) / sine_squared;
-  if (!(s > 0 && t > 0)) return std::nullopt;
-  return Meeting{s, (first.at(s) - second.at(t)).norm()};
-}
-
-Ray ray_towards(const Camera& camera, const Eigen::Vector3d& center, const Eigen::Vector2d& direction) {
-  const Eigen::Vector3d in_rig = camera.cam_from_rig.rotation.transpose() * direction.homogeneous();
-  return {center, in_rig.normalized()};
-}
-
-/// What is needed to triangulate one pixel after the other.
+/// What is needed to triangulate rows of pixels. Holds scratch memory: one a thread.
 class Triangulator {
  public:
   Triangulator(const RayTable& from, const RayTable& to, const TriangulationOptions& options)
-      : from_(from.camera()), to_(to.camera()), from_rays_(from), to_rays_(to), options_(options) {}
+      : pair_(from.camera(), to.camera()), from_(from), to_(to), options_(options) {}
 
-  void put(const Correspondences& matches, int x, int y, PointMap& points) const {
-    const auto fail = [&](PixelStatus why) { points.status(x, y) = why; };
-    if (matches.status(x, y) != PixelStatus::ok) return fail(matches.status(x, y));
-    const Ray ray = ray_towards(from_, from_center_, from_rays_.direction(x, y));
-    const Eigen::Vector2d match(matches.u(x, y), matches.v(x, y));
-    const Ray other = ray_towards(to_, to_center_, to_rays_.direction_at(match));
-    const auto meeting = meet(ray, other);
-    if (!meeting) return fail(PixelStatus::rays_miss);
-    const Eigen::Vector3d point = ray.at(meeting->distance_mm);
-    const auto picture = to_.project(point);
-    if (!picture) return fail(PixelStatus::rays_miss);
-    // A gap of a pixel is what the other camera sees under one at the point's distance.
-    const double gap_px = meeting->gap_mm * to_.fx / (point - to_center_).norm();
-    if (!(gap_px <= options_.max_ray_gap_px)) return fail(PixelStatus::rays_miss);
-    const double depth = (from_.cam_from_rig * point).z();
-    if (depth < options_.near_mm || (options_.far_mm > 0 && depth > options_.far_mm))
-      return fail(PixelStatus::outside_depth);
-    const double pixels_per_mm = (to_.project_jacobian(point) * ray.direction).norm();
-    points.x(x, y) = static_cast<float>(point.x());
-    points.y(x, y) = static_cast<float>(point.y());
-    points.z(x, y) = static_cast<float>(point.z());
-    points.sigma(x, y) = static_cast<float>(matches.sigma(x, y) / pixels_per_mm);
-    points.status(x, y) = PixelStatus::ok;
+  void put_row(const Correspondences& matches, int y, const PixelSet* only, PointMap& points) {
+    rays_.count = 0;
+    for (int x = 0; x < matches.width(); ++x) {
+      if (!takes_part(only, x, y)) continue;
+      points.status(x, y) = matches.status(x, y);
+      if (matches.status(x, y) != PixelStatus::ok) continue;
+      add(x, from_.direction(x, y), to_.direction_at({matches.u(x, y), matches.v(x, y)}));
+      if (rays_.count == RayBatch::most) put_batch(matches, y, points);
+    }
+    put_batch(matches, y, points);
   }
 
  private:
-  const Camera& from_;
-  const Camera& to_;
-  const RayTable& from_rays_;
-  const RayTable& to_rays_;
+  void add(int x, const Eigen::Vector2d& first, const Eigen::Vector2d& second) {
+    const std::size_t k = rays_.count++;
+    columns_[k] = x;
+    rays_.first_x[k] = first.x();
+    rays_.first_y[k] = first.y();
+    rays_.second_x[k] = second.x();
+    rays_.second_y[k] = second.y();
+  }
+
+  void put_batch(const Correspondences& matches, int y, PointMap& points) {
+    intersect(pair_, rays_);
+    for (std::size_t k = 0; k < rays_.count; ++k) {
+      const int x = columns_[k];
+      points.status(x, y) = status_of(k);
+      if (points.status(x, y) != PixelStatus::ok) continue;
+      points.x(x, y) = static_cast<float>(rays_.x[k]);
+      points.y(x, y) = static_cast<float>(rays_.y[k]);
+      points.z(x, y) = static_cast<float>(rays_.z[k]);
+      points.sigma(x, y) = static_cast<float>(matches.sigma(x, y) / rays_.pixels_per_mm[k]);
+    }
+    rays_.count = 0;
+  }
+
+  PixelStatus status_of(std::size_t k) {
+    const double depth = rays_.depth[k];
+    if (!(depth > 0) || !is_valid_at(rays_.radius_squared[k])) return PixelStatus::rays_miss;
+    if (!(rays_.gap_px[k] <= options_.max_ray_gap_px)) return PixelStatus::rays_miss;
+    const bool outside = depth < options_.near_mm || (options_.far_mm > 0 && depth > options_.far_mm);
+    return outside ? PixelStatus::outside_depth : PixelStatus::ok;
+  }
+
+  /// Whether the other camera images what is so far off its axis. What is valid at a radius is valid within.
+  bool is_valid_at(double radius_squared) {
+    if (radius_squared > known_as_valid_ && to_.camera().distortion.is_valid_at(radius_squared))
+      known_as_valid_ = radius_squared;
+    return radius_squared <= known_as_valid_;
+  }
+
+  RayPair pair_;
+  const RayTable& from_;
+  const RayTable& to_;
   const TriangulationOptions& options_;
-  const Eigen::Vector3d from_center_ = from_.center();
-  const Eigen::Vector3d to_center_ = to_.center();
+  RayBatch rays_;
+  std::array<int, RayBatch::most> columns_{};
+  double known_as_valid_ = -1;
 };
 
 }  // namespace
@@ -83,10 +83,9 @@ void triangulate(const Correspondences& matches, const RayTable& from, const Ray
   const auto fits = [&](const auto& map) { return map.width() == from.width() && map.height() == from.height(); };
   if (!fits(matches) || !fits(points))
     throw std::invalid_argument("triangulate: matches or points are not of the camera's size");
-  const Triangulator triangulator(from, to, options);
-  parallel_rows(from.height(), [&](int y) {
-    for (int x = 0; x < from.width(); ++x)
-      if (takes_part(only, x, y)) triangulator.put(matches, x, y, points);
+  parallel_ranges(from.height(), 16, [&](int begin, int end) {
+    Triangulator triangulator(from, to, options);
+    for (int y = begin; y < end; ++y) triangulator.put_row(matches, y, only, points);
   });
 }
 
