@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the time grows with what there is to do: exponents of pixels, frames and depth range.
+// How the time grows with what there is to do: exponents of pixels, frames, depth range and page size.
 #include <array>
+#include <cmath>
 
 #include "bench/comparison.h"
 #include "bench/synthetic_sweep.h"
 #include "pagesweep/camera/ray_table.h"
+#include "pagesweep/dewarping/dewarp.h"
 #include "pagesweep/matching/match_sequences.h"
+#include "pagesweep/sim/analytic_scene.h"
+#include "pagesweep/surfacing/fit_surface.h"
 #include "pagesweep/timing/estimate_times.h"
 #include "pagesweep/triangulation/triangulate.h"
 
@@ -109,6 +113,37 @@ void grow_depths(const Settings& settings, Report& report) {
   measure("sequence matching over the depth range", ranges_mm, sequences, settings, report);
 }
 
+/// A curved sheet of paper in the middle of the table.
+std::vector<PointMap> points_of_sheet(const Rig& rig, double width_mm, double height_mm) {
+  const auto height = [=](double x, double y) {
+    const bool is_paper = std::abs(x) <= width_mm / 2 && std::abs(y) <= height_mm / 2;
+    return is_paper ? 20 + 8 * std::cos(x / 60) : double{not_a_number};
+  };
+  std::vector<PointMap> points;
+  for (const Camera& camera : rig.cameras) points.push_back(sim::AnalyticScene{height, 30, 0}.points(camera));
+  return points;
+}
+
+/// The cameras and the scan stay, so that what is paid for the table is paid alike.
+void grow_pages(const Settings& settings, Report& report) {
+  constexpr std::array<double, 4> widths_mm = {148, 210, 297, 420}, heights_mm = {105, 148, 210, 290};  // A6 ... A3
+  const Rig rig = sim::make_test_rig(1024);
+  Picture scan = make_picture(rig.scanner->width(), rig.scanner->height(), 3, 8);
+  for (std::uint8_t& sample : std::get<Image<std::uint8_t>>(scan.samples).pixels()) sample = 220;
+  std::array<double, 4> areas{};
+  std::array<Way, 4> surfaces, pages;
+  std::array<std::vector<PointMap>, 4> points;
+  std::array<std::vector<PageSurface>, 4> fitted;
+  for (std::size_t k = 0; k < 4; ++k) {
+    areas[k] = widths_mm[k] * heights_mm[k];
+    points[k] = points_of_sheet(rig, widths_mm[k], heights_mm[k]);
+    surfaces[k].run = [&, k] { fitted[k] = fit_surface(points[k]); };
+    pages[k].run = [&, k] { dewarp(fitted[k], scan, *rig.scanner, {.dpi = 300}); };
+  }
+  measure("points to surface over the page's size", areas, surfaces, settings, report);
+  measure("surface to page over the page's size", areas, pages, settings, report);
+}
+
 }  // namespace
 
 void measure_growth(const Settings& settings, Report& report) {
@@ -116,6 +151,7 @@ void measure_growth(const Settings& settings, Report& report) {
   grow_pixels(settings, report);
   grow_frames(settings, report);
   grow_depths(settings, report);
+  grow_pages(settings, report);
 }
 
 }  // namespace pagesweep::bench

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <exception>
 
 #include "bench/comparison.h"
@@ -40,8 +41,13 @@ int main(int argc, char** argv) try {
   CLI11_PARSE(app, argc, argv);
 
   Report report;
-  for (const Group& group : groups)
-    if (only.empty() || std::ranges::find(only, group.name) != only.end()) group.measure(settings, report);
+  for (const Group& group : groups) {
+    if (!only.empty() && std::ranges::find(only, group.name) == only.end()) continue;
+    const auto start = std::chrono::steady_clock::now();
+    group.measure(settings, report);
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    report.note(fmt::format("measuring {} took {:.0f} s", group.name, taken.count()));
+  }
   if (!json.empty()) report.write_json(json);
   return 0;
 } catch (const std::exception& error) {
