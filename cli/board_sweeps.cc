@@ -11,6 +11,7 @@
 #include "cli/board_pictures.h"
 #include "cli/capture_input.h"
 #include "pagesweep/base/error.h"
+#include "pagesweep/base/median.h"
 #include "pagesweep/calibration/light_sightings.h"
 #include "pagesweep/io/capture_file.h"
 #include "pagesweep/io/image_file.h"
@@ -19,12 +20,6 @@ namespace pagesweep::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The sensor of that name; a new one if there is none yet.
 /// \throws Error  if it has pictures of another size

@@ -10,18 +10,13 @@
 #include <optional>
 
 #include "pagesweep/base/error.h"
+#include "pagesweep/base/median.h"
 
 namespace pagesweep {
 namespace {
 
 constexpr std::size_t least_sightings = 100;
 constexpr double least_frames = 10;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::vector<double> misses(std::span<const LightSighting> sightings, const Light& light) {
   std::vector<double> values;

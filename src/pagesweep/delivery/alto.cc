@@ -35,7 +35,8 @@ class AltoWriter {
       pugi::xml_node element = add_box(space, "TextBlock", fmt::format("block_{}", ++blocks_), paragraph.box);
       if (const std::string language = iso_language(paragraph.language); !language.empty())
         element.append_attribute("LANG") = language.c_str();
-      for (const TextLine& line : paragraph.lines) add(element, line);
+      for (const TextLine& line : paragraph.lines)
+        if (!line.words.empty()) add(element, line);  // the schema knows no line without a string
     }
   }
 
@@ -55,7 +56,7 @@ class AltoWriter {
                      {"WIDTH", number(std::max(0.0, word.box.left - before->box.right))}});
       before = &word;
       pugi::xml_node string = add_box(element, "String", fmt::format("word_{}", ++words_), word.box);
-      string.append_attribute("CONTENT") = word.text.c_str();
+      string.append_attribute("CONTENT") = xml_text(word.text).c_str();
       string.append_attribute("WC") = fmt::format("{:.2f}", word.confidence).c_str();
     }
   }

@@ -8,6 +8,7 @@
 
 #include "pagesweep/delivery/alto.h"
 #include "pagesweep/delivery/checksum.h"
+#include "pagesweep/delivery/xml_structure_testing.h"
 #include "pagesweep/io/files_testing.h"
 #include "pagesweep/io/pages_file.h"
 #include "pagesweep/ocr/recognise_text.h"
@@ -201,6 +202,8 @@ TEST(Deliver, RecognisedTextIsInAllThatCanHoldIt) {
   EXPECT_EQ(text, "Words stand where they stand. ");
   EXPECT_THAT(read_text(folder / "job/hocr/page_0001.hocr"), HasSubstr(">Words</span>"));
   EXPECT_THAT(read_text(folder / "job/mets.xml"), HasSubstr("USE=\"FULLTEXT\""));
+  EXPECT_EQ(test::StructureCheck(test::alto_rules()).errors_of(alto), "");
+  EXPECT_EQ(test::StructureCheck(test::mets_rules()).errors_of(load(folder / "job/mets.xml")), "");
 }
 
 /// The structure that the schema of ALTO 4.2 prescribes, as far as our files use it.

@@ -11,17 +11,24 @@ namespace pagesweep {
 
 using XmlAttributes = std::initializer_list<std::pair<const char*, std::string>>;
 
+/// A text without the control characters for which XML 1.0 has no place, not even as numbers.
+inline std::string xml_text(std::string text) {
+  std::erase_if(text,
+                [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n' && c != '\r'; });
+  return text;
+}
+
 /// Appends an element; attributes without a value are left out.
 inline pugi::xml_node add_element(pugi::xml_node parent, const char* name, const XmlAttributes& attributes = {}) {
   pugi::xml_node element = parent.append_child(name);
   for (const auto& [attribute, value] : attributes)
-    if (!value.empty()) element.append_attribute(attribute) = value.c_str();
+    if (!value.empty()) element.append_attribute(attribute) = xml_text(value).c_str();
   return element;
 }
 
 /// Appends an element that holds a text, unless the text is empty.
 inline void add_text(pugi::xml_node parent, const char* name, const std::string& text) {
-  if (!text.empty()) parent.append_child(name).text() = text.c_str();
+  if (!text.empty()) parent.append_child(name).text() = xml_text(text).c_str();
 }
 
 inline pugi::xml_document new_document() {

@@ -8,6 +8,7 @@
 #include <map>
 #include <vector>
 
+#include "pagesweep/base/median.h"
 #include "pagesweep/base/parallel.h"
 
 namespace pagesweep {
@@ -33,12 +34,6 @@ std::pair<double, double> bar_integrals(double distance, double a, double b) {
   };
   const auto odd = [&](double x) { return -1 / (2 * (d2 + x * x)); };
   return {even(b) - even(a), odd(b) - odd(a)};
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// A spot of paper in the light, without the lamp: what does not change while lamps are tried.

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "pagesweep/base/error.h"
+#include "pagesweep/base/median.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/timing/bell_fit.h"
 
@@ -40,12 +41,6 @@ std::uint64_t mix(std::uint64_t z) {  // splitmix64's finaliser
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
   z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
   return z ^ (z >> 31);
-}
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double ceiling_of(const Frames& frames) {
