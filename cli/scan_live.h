@@ -25,6 +25,6 @@ struct LiveScan {
 /// Measures a sweep while it goes on, and flattens the pages when it has ended. What was measured is written even if a
 /// camera fails, or no picture comes.
 /// \throws Error  if nothing can be measured, and in the end if something was missing
-void scan_live(const LiveScan& scan);
+void scan_live(const LiveScan& arguments);
 
 }  // namespace pagesweep::cli

@@ -297,7 +297,7 @@ void FakeRig::State::tick(std::int64_t number, std::int64_t timestamp_ns) {
   const long frame = sweep_tick < 0 ? -1 : static_cast<long>(number - sweep_tick);
   const auto skips = [&](const MatrixCamera& camera) {
     return camera.is_dropped(frame) ||
-           (camera.name() == options.slow_camera && frame >= options.slow_frame && frame % 2 == 1);
+           (camera.name() == options.slow_camera && frame >= options.slow_frame && frame % 2 != 0);
   };
   for (auto& camera : cameras)
     if (camera->is_connected() && camera->is_wired() && !skips(*camera)) camera->trigger(frame, timestamp_ns);

@@ -180,7 +180,8 @@ TEST_F(LiveRig, ACameraThatDiesEndsTheSweepWhatThereIsIsKeptAndWhenItIsBackTheNe
 }
 
 TEST_F(LiveRig, ACameraThatSlowsDownIsNamedAndTheSweepGoesOn) {
-  options.slow_camera = "cam2", options.delay_s = 1;
+  options.slow_camera = "cam2", options.delay_s = 1.2;
+  options.slow_frame = -100;  // in the dark already
   const FakeRig rig(make_frames(), std::nullopt, options);
   const auto live = open_source();
   const std::vector<Given> given = record(*live, folder());
