@@ -38,6 +38,7 @@ struct PageSurface {
   Image<float> strain, strain_sigma;
   bool gutter_at_left = false;   ///< the left end of the grid is the book's gutter: the page ends there
   bool gutter_at_right = false;  ///< likewise the right end
+  double turned_rad = 0;         ///< by how much a sheet that lay askew was turned back; clockwise is positive
 
   int columns() const { return model.width(); }
   int rows() const { return model.height(); }

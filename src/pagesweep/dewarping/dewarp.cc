@@ -68,7 +68,7 @@ Page make_page(const PaperView& view, const Occlusion& occlusion, const PageOutl
   page.index = view.surface().index;
   page.scan_map = build_scan_map(view, occlusion, outline.frame, pixels_per_mm);
   page.picture = resample(scan, page.scan_map, pixels_per_mm, resampling);
-  page.deskew_rad = outline.frame.angle_rad;
+  page.deskew_rad = view.surface().turned_rad + outline.frame.angle_rad;
   page.measured_share = measured_share(view.surface(), outline.frame);
   return page;
 }

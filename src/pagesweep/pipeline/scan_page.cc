@@ -282,6 +282,7 @@ Scan flatten(Measurement&& measurement, const Picture& picture, const Rig& rig, 
                             picture.width(), picture.height(), rig.scanner->width(), rig.scanner->height()));
   SurfaceOptions surface_options = options.surface;
   surface_options.reading_direction_rad = reading_direction(*rig.scanner);
+  surface_options.straighten = options.dewarp.deskew;
 
   Scan scan;
   scan.surfaces = fit_surface(measurement.points, surface_options, progress);

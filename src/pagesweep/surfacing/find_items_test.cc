@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "pagesweep/surfacing/fit_surface.h"
@@ -43,6 +44,30 @@ TEST(FindItems, EachSheetIsAPageInReadingOrder) {
     EXPECT_NEAR(corner.y(), card.y1, 4);
     EXPECT_NEAR((page.columns() - 1) * page.spacing_mm - 16, card.x1 - card.x0, 7);
   }
+}
+
+TEST(FindItems, ASheetThatLiesAskewStandsUpright) {
+  constexpr double angle = 0.5, width = 100, height = 60;  // turned counterclockwise, as seen from above
+  const auto is_card = [](double x, double y) {
+    const Eigen::Vector2d place = Eigen::Rotation2Dd(-angle) * Eigen::Vector2d(x - 10, y + 5);
+    return std::abs(place.x()) < width / 2 && std::abs(place.y()) < height / 2;
+  };
+  const sim::AnalyticScene scene{[&](double x, double y) { return is_card(x, y) ? 2.0 : 0.0; }, 20, -5};
+  scenes::Measuring how;
+  how.brightness = [&](double x, double y) { return is_card(x, y) ? 100.0 : 8.0; };
+  const auto points = scenes::measure(scene, how);
+  SurfaceOptions options;
+  options.layout = Layout::items;
+  const std::vector<PageSurface> pages = fit_surface(points, options);
+  ASSERT_EQ(pages.size(), 1u);
+  const PageSurface& page = pages[0];
+  // Cells of some millimetres tell the angle roughly; the page's edges in the picture do the rest.
+  EXPECT_NEAR(page.turned_rad, -angle, 0.05);
+  EXPECT_NEAR((page.columns() - 1) * page.spacing_mm - 16, width, 9);
+  EXPECT_NEAR((page.rows() - 1) * page.spacing_mm - 16, height, 9);
+
+  options.straighten = false;
+  EXPECT_EQ(fit_surface(points, options).at(0).turned_rad, 0);
 }
 
 TEST(FindItems, SmallThingsAreNone) {

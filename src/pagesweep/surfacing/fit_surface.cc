@@ -188,13 +188,13 @@ double strained_share(const FlatPage& flat) { return flat.strain().share_beyond(
 PageSurface finish_page(const FittedPage& fitted, const HeightField& field, const SurfaceOptions& options) {
   const Differences differences = measure_differences(field, fitted.cells, fitted.model, options.neighbourhood_mm,
                                                       fitted.gutter != GutterSide::none);
-  const FlatPage by_model(fitted.model, differences, fitted.places, fitted.gutter);
+  const FlatPage by_model(fitted.model, differences, fitted.places, fitted.gutter, options.straighten);
   // Dents of the paper and the rims of the measurement strain a good cylinder as well, in a few places.
   const bool may_follow = options.model == SurfaceModel::developable ||
                           (options.model == SurfaceModel::automatic && strained_share(by_model) > share_that_matters);
   if (!may_follow) return sample(by_model, field, SurfaceModel::cylinder);
   const Differences creased = crease_differences(differences, fitted.model, options.neighbourhood_mm);
-  FlatPage flat(fitted.model, creased, fitted.places, fitted.gutter);
+  FlatPage flat(fitted.model, creased, fitted.places, fitted.gutter, options.straighten);
   flat.follow_measurement();
   // Points too coarse for the sheet's folds make it one that no paper could be: the model knows better.
   if (options.model == SurfaceModel::automatic && strained_share(flat) > strained_share(by_model))

@@ -33,6 +33,7 @@ struct SurfaceOptions {
   double smoothing = 1;
   double neighbourhood_mm = 6;
   double reading_direction_rad = 0;  ///< of the page's rightward direction against rig x, in the rig's xy plane
+  bool straighten = true;            ///< a rectangular sheet without a gutter stands upright however it lies
 
   template <class Visitor>
   void describe(Visitor&& visit) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/surfacing/straighten.h"
 
 namespace pagesweep {
 namespace {
@@ -16,6 +17,7 @@ constexpr double explained_sigmas = 4;  // strain beyond so many standard deviat
 constexpr double coarsest_spacing_mm = 2, finest_spacing_mm = 0.7;
 constexpr double interpolation_error_mm = 0.01;
 constexpr double guessed_weight = 1e-3;  // of lengths where nothing was measured
+constexpr double least_straightening_rad = 0.1;
 
 struct Range {
   double low = 1e300, high = -1e300;
@@ -30,6 +32,16 @@ Range alpha_range(const RuledSurface& model, std::span<const Support> places, Gu
   for (const Support& place : places) range.include(model.frame.ruling_from_plan(place.plan).x());
   if (gutter != GutterSide::none) range.include(0);
   return range;
+}
+
+/// By how much a single page is askew when its places on the paper are turned as they are seen from above. Little is
+/// left to the page's edges and its text, which know better.
+double straightening(const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>& paper_and_plan,
+                     const Eigen::Rotation2Dd& turn) {
+  std::vector<Eigen::Vector2d> seen;
+  for (const auto& [paper, plan] : paper_and_plan) seen.push_back(turn * paper);
+  const double angle = askew_rad(std::move(seen));
+  return std::abs(angle) > least_straightening_rad ? angle : 0;
 }
 
 }  // namespace
@@ -82,10 +94,11 @@ double CutLength::alpha_at(double length_mm) const {
 }
 
 FlatPage::FlatPage(const RuledSurface& model, const Differences& differences, std::span<const Support> places,
-                   GutterSide gutter)
+                   GutterSide gutter, bool straighten)
     : model_(model),
       differences_(differences),
       gutter_(gutter),
+      straighten_(straighten),
       cut_(model, alpha_range(model, places, gutter).low, alpha_range(model, places, gutter).high) {
   const Range alpha = alpha_range(model, places, gutter);
   length0_ = cut_.length_at(alpha.low) - (gutter == GutterSide::left ? 0 : margin_mm);
@@ -215,8 +228,8 @@ Eigen::Vector2d FlatPage::paper_at(const Eigen::Vector2d& plan) const {
   return interpolate_nodes(flat_, (cut_.length_at(ruling.x()) - length0_) / length_step_, (ruling.y() - b0_) / b_step_);
 }
 
-/// Turns the paper so that the gutter runs along t; a single page so that it lies as it is seen from above. Then shifts
-/// (0, 0) to the upper left corner of what is measured.
+/// Turns the paper so that the gutter runs along t; a single page so that it lies as it is seen from above, or upright
+/// if it is far from that. Then shifts (0, 0) to the upper left corner of what is measured.
 void FlatPage::turn_upright() {
   double sine = 0, cosine = 0;
   const auto add = [&](const Eigen::Vector2d& is, const Eigen::Vector2d& should) {
@@ -238,8 +251,9 @@ void FlatPage::turn_upright() {
       mean_plan += pairs.back().second / static_cast<double>(places_.size());
     }
     for (const auto& [flat, plan] : pairs) add(flat - mean_flat, plan - mean_plan);
+    if (straighten_) turned_rad_ = straightening(pairs, Eigen::Rotation2Dd(std::atan2(sine, cosine)));
   }
-  const Eigen::Rotation2Dd turn(std::atan2(sine, cosine));
+  const Eigen::Rotation2Dd turn(std::atan2(sine, cosine) - turned_rad_);
   for (Eigen::Vector2d& place : flat_.pixels()) place = turn * place;
   find_outline();
 }
@@ -298,6 +312,7 @@ PageSurface FlatPage::empty_page(double spacing_mm) const {
 
 PageSurface FlatPage::sample(const PlanFrame& frame) const {
   PageSurface page = empty_page(spacing_mm_);
+  page.turned_rad = turned_rad_;
   page.measured = page.model;
   page.sigma = Image<float>(page.columns(), page.rows(), not_a_number);
   page.status = Image<PixelStatus>(page.columns(), page.rows(), PixelStatus::not_computed);

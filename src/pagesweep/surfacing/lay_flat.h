@@ -43,9 +43,10 @@ struct Strain {
 /// A page's model surface and its flattening, as functions.
 class FlatPage {
  public:
-  /// \param places  the page's measured places: the grid covers them and a margin
+  /// \param places      the page's measured places: the grid covers them and a margin
+  /// \param straighten  whether a page without a gutter that lies askew is to stand upright
   FlatPage(const RuledSurface& model, const Differences& differences, std::span<const Support> places,
-           GutterSide gutter);
+           GutterSide gutter, bool straighten);
   /// Takes the measured surface itself for the model: it is laid flat anew, with the least stretching.
   void follow_measurement();
 
@@ -79,6 +80,8 @@ class FlatPage {
   const Differences& differences_;
   std::vector<Eigen::Vector2d> places_;
   GutterSide gutter_;
+  bool straighten_;
+  double turned_rad_ = 0;
   CutLength cut_;
   double length0_ = 0, length1_ = 0, length_step_ = 1, b0_ = 0, b1_ = 0, b_step_ = 1;
   int columns_ = 0, rows_ = 0;
