@@ -61,14 +61,17 @@ double energy(const std::vector<Edge>& edges, const Eigen::VectorXd& places) {
 }
 
 /// The Gauss-Newton step. Three coordinates, which turn and shift the whole, are held: both of the middle node and one
-/// of the node above it.
+/// of a node at the border.
 class Relaxation {
  public:
   Relaxation(const Sheet& sheet, std::vector<Edge> edges, Eigen::VectorXd places)
       : edges_(std::move(edges)), places_(std::move(places)) {
     const int middle = (sheet.rows / 2) * sheet.columns + sheet.columns / 2;
     const int below = middle % sheet.columns;
-    held_ = {2 * middle, 2 * middle + 1, 2 * (below == middle ? middle + sheet.columns : below)};
+    const int other = below == middle ? middle + sheet.columns : below;
+    // The one that a turn about the middle changes most.
+    const Eigen::Vector2d arm = places_.segment<2>(2 * other) - places_.segment<2>(2 * middle);
+    held_ = {2 * middle, 2 * middle + 1, 2 * other + (std::abs(arm.x()) > std::abs(arm.y()) ? 1 : 0)};
   }
 
   void run() {

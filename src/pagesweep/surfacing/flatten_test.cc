@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
 #include <numbers>
 #include <stdexcept>
 
@@ -42,7 +44,7 @@ TEST(Flatten, UnrollsACylinderAboutASlantingAxis) {
   EXPECT_LT(right.x() * up.y() - right.y() * up.x(), 0) << "oriented as the start, which is mirrored against (i, j)";
 }
 
-TEST(Flatten, UnrollsACone) {
+TEST(Flatten, UnrollsAConeHoweverTheStartIsTurned) {
   // Apex angle such that the cone becomes a sector: distance from the apex r, angle in the plane phi sin(opening).
   const double opening = 0.5;
   const Sheet sheet{25, 25, [&](double i, double j) {
@@ -50,15 +52,18 @@ TEST(Flatten, UnrollsACone) {
                       return Eigen::Vector3d(r * std::sin(opening) * std::sin(phi), r * std::cos(opening),
                                              r * std::sin(opening) * std::cos(phi));
                     }};
-  Image<Eigen::Vector2d> start(25, 25, Eigen::Vector2d::Zero());
-  for (int j = 0; j < 25; ++j)
-    for (int i = 0; i < 25; ++i) start(i, j) = {(i - 12) * 3.0, 100 + 4.0 * j};
-  const auto flat = flatten(sheet, start);
   const double sector = 24 * 0.05 * std::sin(opening);
-  // Edges are measured along circles instead of straight lines: (0.05 sin(opening))^2 / 24 = 2.4e-5 longer.
-  EXPECT_NEAR(distance(flat, 0, 24, 24, 24), 2 * 196 * std::sin(sector / 2), 0.01);
-  EXPECT_NEAR(distance(flat, 0, 0, 24, 0), 2 * 100 * std::sin(sector / 2), 0.01);
-  EXPECT_NEAR(distance(flat, 3, 0, 3, 24), 96, 0.01);
+  for (const double turn : {0.0, 0.8, 0.5 * std::numbers::pi, 3.0}) {
+    Image<Eigen::Vector2d> start(25, 25, Eigen::Vector2d::Zero());
+    for (int j = 0; j < 25; ++j)
+      for (int i = 0; i < 25; ++i)
+        start(i, j) = Eigen::Rotation2Dd(turn) * Eigen::Vector2d((i - 12) * 3.0, 100 + 4.0 * j);
+    const auto flat = flatten(sheet, start);
+    // Edges are measured along circles instead of straight lines: (0.05 sin(opening))^2 / 24 = 2.4e-5 longer.
+    EXPECT_NEAR(distance(flat, 0, 24, 24, 24), 2 * 196 * std::sin(sector / 2), 0.01);
+    EXPECT_NEAR(distance(flat, 0, 0, 24, 0), 2 * 100 * std::sin(sector / 2), 0.01);
+    EXPECT_NEAR(distance(flat, 3, 0, 3, 24), 96, 0.01);
+  }
 }
 
 TEST(Flatten, SpreadsTheErrorOfADomeAndReportsIt) {
