@@ -29,8 +29,6 @@ class PageLight {
   /// \param views  all pages of the scan; kept, with `scan`, as references
   PageLight(std::span<const PaperView> views, const Picture& scan, const ScanLight& light);
 
-  /// The light that is reckoned with: what was known of it, and what the pages themselves show.
-  const ScanLight& light() const { return light_; }
   LightGain gain(std::size_t page, const PageFrame& frame) const;
 
  private:
