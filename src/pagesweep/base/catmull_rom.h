@@ -12,4 +12,9 @@ constexpr std::array<double, 4> catmull_rom_weights(double x) {
           x * x * (-0.5 + 0.5 * x)};
 }
 
+/// Their derivatives with respect to x.
+constexpr std::array<double, 4> catmull_rom_slopes(double x) {
+  return {-0.5 + x * (2 - 1.5 * x), x * (-5 + 4.5 * x), 0.5 + x * (4 - 4.5 * x), x * (-1 + 1.5 * x)};
+}
+
 }  // namespace pagesweep

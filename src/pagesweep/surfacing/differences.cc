@@ -228,12 +228,14 @@ Differences crease_differences(const Differences& differences, const RuledSurfac
 
 Eigen::Vector3d measured_above(const RuledSurface& model, const Differences& differences, const Eigen::Vector3d& point,
                                const Eigen::Vector3d& normal) {
+  constexpr double near_mm = 1e-6;
   Eigen::Vector3d above = point;
   // Newton's method along the normal; the derivative is that of the model.
   for (int step = 0; step < 4; ++step) {
     const Eigen::Vector2d plan = above.head<2>();
     const double missing = model.height(plan) + differences.at(plan.x(), plan.y()) - above.z();
     above += missing * normal.z() * normal;
+    if (std::abs(missing) < near_mm) break;
   }
   return above;
 }

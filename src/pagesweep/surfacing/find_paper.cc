@@ -24,13 +24,20 @@ constexpr double table_depth_mm = 5, table_flatness_mm = 0.7;
 template <class Better>
 Image<float> extreme(const Image<float>& image, int reach, bool along_rows, Better better) {
   Image<float> result(image.width(), image.height(), not_a_number);
-  for (int y = 0; y < image.height(); ++y)
-    for (int x = 0; x < image.width(); ++x)
-      for (int k = -reach; k <= reach; ++k) {
-        const int i = along_rows ? x + k : x, j = along_rows ? y : y + k;
-        if (!image.contains(i, j) || std::isnan(image(i, j))) continue;
-        if (std::isnan(result(x, y)) || better(image(i, j), result(x, y))) result(x, y) = image(i, j);
+  parallel_rows(image.height(), [&](int y) {
+    const std::span<float> best = result.row(y);
+    for (int k = -reach; k <= reach; ++k) {  // whole rows at a time, so that the compiler makes vectors of them
+      const int di = along_rows ? k : 0, dj = along_rows ? 0 : k;
+      if (y + dj < 0 || y + dj >= image.height()) continue;
+      const std::span<const float> other = image.row(y + dj);
+      const int begin = std::max(0, -di), end = std::min(image.width(), image.width() - di);
+      for (int x = begin; x < end; ++x) {
+        const float value = other[static_cast<std::size_t>(x + di)];
+        float& so_far = best[static_cast<std::size_t>(x)];
+        so_far = std::isnan(so_far) || better(value, so_far) ? value : so_far;
       }
+    }
+  });
   return result;
 }
 

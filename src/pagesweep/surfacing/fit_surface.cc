@@ -21,6 +21,7 @@ namespace {
 constexpr double smallest_kink = 0.15;  // change of slope below which two pages do not fix the line where they meet
 constexpr double largest_correction_mm = 4;
 constexpr double many_outliers = 0.25;
+constexpr int draft_rows = 80;
 constexpr double nearest_to_gutter_mm = 0.2;
 constexpr double mixed_cells = 1;             // beside the gutter: as far as the spot of a pixel reaches
 constexpr double least_lift_mm = 0.01;        // of points there, by which they are known to lie between the pages
@@ -110,7 +111,7 @@ RulingFrame meeting_line(const RuledSurface& left, const RuledSurface& right, co
   if (2 * n < places || !(spread > 0)) return gutter;
   const double turn = (n * ab - a1 * b1) / spread;
   const double shift = (a1 - turn * b1) / n;
-  return {gutter.plan_from_ruling(shift, 0), gutter.angle_rad - std::atan(turn), 0};
+  return {gutter.plan_from_ruling(shift, 0), gutter.angle_rad() - std::atan(turn), 0};
 }
 
 /// How far the points beside the gutter, up to `gap_mm` from it, lie above the pages that were fitted without them
@@ -137,27 +138,36 @@ double lift_at_gutter(const HeightField& field, const Image<std::uint8_t>& paper
   return *middle;
 }
 
+/// A few rows of a mask: rulings run across them, so that they tell a page's shape as well, with a little more noise.
+Image<std::uint8_t> few_rows_of(const Image<std::uint8_t>& mask) {
+  const int step = std::max(1, mask.height() / draft_rows);
+  Image<std::uint8_t> few(mask.width(), mask.height(), 0);
+  for (int j = 0; j < mask.height(); j += step) std::ranges::copy(mask.row(j), few.row(j).begin());
+  return few;
+}
+
 /// The gutter is where the pages meet, and the pages are what ends at the gutter: from coarse to fine. Until it is
-/// known, parallel rulings will do.
+/// known, parallel rulings and drafts from a few rows will do.
 std::vector<FittedPage> fit_both_pages(const HeightField& field, const Image<std::uint8_t>& paper, RulingFrame gutter,
                                        const SurfaceOptions& options) {
-  const auto fit = [&](double gap_mm, bool search) {
+  const auto fit = [&](const Image<std::uint8_t>& cells, double gap_mm, bool search) {
     std::vector<FittedPage> pages(2);
     parallel_rows(2, [&](int k) {
       const GutterSide side = k == 0 ? GutterSide::right : GutterSide::left;  // of the left page, of the right page
       pages[static_cast<std::size_t>(k)] =
-          fit_page(field, side_of(field, paper, gutter, side, gap_mm), side, gutter, search, options);
+          fit_page(field, side_of(field, cells, gutter, side, gap_mm), side, gutter, search, options);
     });
     return pages;
   };
+  const Image<std::uint8_t> few_rows = few_rows_of(paper);
   for (const double gap_mm : {2.0, 0.5}) {
-    const auto pages = fit(gap_mm, false);
-    gutter = meeting_line(pages[0].model, pages[1].model, gutter);
+    const auto drafts = fit(few_rows, gap_mm, false);
+    gutter = meeting_line(drafts[0].model, drafts[1].model, gutter);
   }
   // What lies between the pages would round the crease, and cost each of them some of its width.
   const double mixed_mm = mixed_cells * field.cell_mm;
-  const double lift = lift_at_gutter(field, paper, fit(mixed_mm, false), gutter, mixed_mm);
-  return fit(lift > least_lift_mm ? mixed_mm : nearest_to_gutter_mm, true);
+  const double lift = lift_at_gutter(field, paper, fit(few_rows, mixed_mm, false), gutter, mixed_mm);
+  return fit(paper, lift > least_lift_mm ? mixed_mm : nearest_to_gutter_mm, true);
 }
 
 /// A gutter, if the layout is a spread or turns out to be one.

@@ -173,4 +173,23 @@ Image<Eigen::Vector2d> flatten(const Sheet& sheet, const Image<Eigen::Vector2d>&
   return flat;
 }
 
+InterpolatedNode differentiate_nodes(const Image<Eigen::Vector2d>& nodes, double i, double j) {
+  const NodeWeights columns(i, nodes.width()), rows(j, nodes.height());
+  const auto wi = columns.values(), wj = rows.values(), di = columns.slopes(), dj = rows.slopes();
+  InterpolatedNode node;
+  for (std::size_t b = 0; b < 4; ++b) {
+    Eigen::Vector2d row = Eigen::Vector2d::Zero(), row_slope = row;
+    for (std::size_t a = 0; a < 4; ++a) {
+      const int column = columns.first + static_cast<int>(a), line = rows.first + static_cast<int>(b);
+      if (!nodes.contains(column, line)) continue;
+      row += wi[a] * nodes(column, line);
+      row_slope += di[a] * nodes(column, line);
+    }
+    node.value += wj[b] * row;
+    node.jacobian.col(0) += wj[b] * row_slope;
+    node.jacobian.col(1) += dj[b] * row;
+  }
+  return node;
+}
+
 }  // namespace pagesweep

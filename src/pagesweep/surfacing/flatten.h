@@ -33,26 +33,55 @@ struct Distortion {
 Image<Eigen::Vector2d> flatten(const Sheet& sheet, const Image<Eigen::Vector2d>& start,
                                Distortion* distortion = nullptr);
 
+/// The four nodes around a position along one axis: the first one's index, and weights of Catmull-Rom interpolation,
+/// straight on beyond the border. A node beyond the border weighs nothing.
+struct NodeWeights {
+  NodeWeights(double position, int count)
+      : first(static_cast<int>(std::clamp(std::floor(position), 0.0, std::max(0.0, count - 2.0))) - 1),
+        x(position - (first + 1)),
+        at_low_border(first < 0),
+        at_high_border(first + 3 >= count) {}
+
+  std::array<double, 4> values() const {
+    return within(is_between() ? catmull_rom_weights(x) : std::array<double, 4>{0, 1 - x, x, 0});
+  }
+  /// Their derivatives with respect to the position.
+  std::array<double, 4> slopes() const {
+    return within(is_between() ? catmull_rom_slopes(x) : std::array<double, 4>{0, -1, 1, 0});
+  }
+
+  int first;
+  double x;
+  bool at_low_border, at_high_border;
+
+ private:
+  bool is_between() const { return x >= 0 && x <= 1; }
+  /// Nodes beyond the border are extrapolated from the two at it.
+  std::array<double, 4> within(std::array<double, 4> w) const {
+    if (at_low_border) w = {0, w[1] + 2 * w[0], w[2] - w[0], w[3]};
+    if (at_high_border) w = {w[0], w[1] - w[3], w[2] + 2 * w[3], 0};
+    return w;
+  }
+};
+
 /// Bicubic (Catmull-Rom) interpolation of nodes, straight on beyond the border.
 template <class T>
 T interpolate_nodes(const Image<T>& nodes, double i, double j) {
-  const int i0 = static_cast<int>(std::clamp(std::floor(i), 0.0, std::max(0.0, nodes.width() - 2.0)));
-  const int j0 = static_cast<int>(std::clamp(std::floor(j), 0.0, std::max(0.0, nodes.height() - 2.0)));
-  // The four nodes' weights; nodes beyond the border are extrapolated from the two at it.
-  const auto weights = [](double x, int first, int count) {
-    std::array<double, 4> w{0, 1 - x, x, 0};
-    if (x >= 0 && x <= 1) w = catmull_rom_weights(x);
-    if (first == 0) w = {0, w[1] + 2 * w[0], w[2] - w[0], w[3]};
-    if (first + 2 >= count) w = {w[0], w[1] - w[3], w[2] + 2 * w[3], 0};
-    return w;
-  };
-  const auto wi = weights(i - i0, i0, nodes.width()), wj = weights(j - j0, j0, nodes.height());
-  T sum = nodes(i0, j0) * 0;
+  const NodeWeights columns(i, nodes.width()), rows(j, nodes.height());
+  const auto wi = columns.values(), wj = rows.values();
+  T sum = nodes(columns.first + 1, rows.first + 1) * 0;
   for (int b = 0; b < 4; ++b)
     for (int a = 0; a < 4; ++a)
       if (const double w = wi[static_cast<std::size_t>(a)] * wj[static_cast<std::size_t>(b)]; w != 0)
-        sum += nodes(i0 - 1 + a, j0 - 1 + b) * w;
+        sum += nodes(columns.first + a, rows.first + b) * w;
   return sum;
 }
+
+/// What interpolate_nodes() gives, and its derivatives with respect to i and j.
+struct InterpolatedNode {
+  Eigen::Vector2d value = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d jacobian = Eigen::Matrix2d::Zero();  ///< columns: d / di, d / dj
+};
+InterpolatedNode differentiate_nodes(const Image<Eigen::Vector2d>& nodes, double i, double j);
 
 }  // namespace pagesweep

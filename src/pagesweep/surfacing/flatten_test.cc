@@ -94,5 +94,19 @@ TEST(InterpolateNodes, ReproducesAParaboloidInsideAndGoesOnStraight) {
   EXPECT_NEAR(interpolate_nodes(nodes, -1, 2), 2 * f(0, 2) - f(1, 2), 1e-12);
 }
 
+TEST(InterpolateNodes, KnowsItsDerivativesInsideAtTheBorderAndBeyond) {
+  Image<Eigen::Vector2d> nodes(7, 5);
+  for (int j = 0; j < 5; ++j)
+    for (int i = 0; i < 7; ++i) nodes(i, j) = {i + 0.2 * std::sin(j), j + 0.1 * i * j + 0.3 * std::cos(i)};
+  constexpr double h = 1e-6;
+  for (const Eigen::Vector2d& at : {Eigen::Vector2d(3.3, 2.4), {0.4, 0.2}, {5.7, 3.9}, {-1.2, 2.5}, {3.5, 6.1}}) {
+    const InterpolatedNode node = differentiate_nodes(nodes, at.x(), at.y());
+    const auto f = [&](double di, double dj) { return interpolate_nodes(nodes, at.x() + di, at.y() + dj); };
+    EXPECT_LT((node.value - f(0, 0)).norm(), 1e-12);
+    EXPECT_LT((node.jacobian.col(0) - (f(h, 0) - f(-h, 0)) / (2 * h)).norm(), 1e-8);
+    EXPECT_LT((node.jacobian.col(1) - (f(0, h) - f(0, -h)) / (2 * h)).norm(), 1e-8);
+  }
+}
+
 }  // namespace
 }  // namespace pagesweep

@@ -110,7 +110,7 @@ FlatPage::FlatPage(const RuledSurface& model, const Differences& differences, st
 
   // To begin with: arc length along the cut, length along the ruling, t downwards.
   Image<Eigen::Vector2d> start(columns_, rows_, Eigen::Vector2d::Zero());
-  const Eigen::Rotation2Dd turn(model.frame.angle_rad);
+  const Eigen::Rotation2Dd turn(model.frame.angle_rad());
   for (int j = 0; j < rows_; ++j)
     for (int i = 0; i < columns_; ++i) {
       const Eigen::Vector2d up = turn * Eigen::Vector2d(length0_ + i * length_step_, b0_ + j * b_step_);
@@ -140,27 +140,29 @@ void FlatPage::follow_measurement() {
   spacing_mm_ = fine_enough_spacing();
 }
 
-Eigen::Vector3d FlatPage::model_point(double i, double j) const {
-  return model_.point(cut_.alpha_at(length0_ + i * length_step_), b0_ + j * b_step_);
+Eigen::Vector3d FlatPage::above(double alpha, double b) const {
+  return measured_above(model_, differences_, model_.point(alpha, b), model_.normal(alpha, b));
 }
 
-Eigen::Vector3d FlatPage::model_normal(double i, double j) const {
-  const double h = 1e-3;
-  const Eigen::Vector3d across = model_point(i + h, j) - model_point(i - h, j);
-  const Eigen::Vector3d along = model_point(i, j + h) - model_point(i, j - h);
-  return across.cross(along).normalized();
+Eigen::Vector3d FlatPage::surface_point(double alpha, double b) const {
+  return follows_ ? above(alpha, b) : model_.point(alpha, b);
 }
 
-Eigen::Vector3d FlatPage::above(double i, double j) const {
-  return measured_above(model_, differences_, model_point(i, j), model_normal(i, j));
+/// Alpha of columns that divide each of the grid's into `finer`.
+std::vector<double> FlatPage::alphas_of(int columns, int finer) const {
+  std::vector<double> alphas;
+  for (int i = 0; i < columns; ++i) alphas.push_back(alpha_of(double(i) / finer));
+  return alphas;
 }
 
 void FlatPage::lay_flat(const Image<Eigen::Vector2d>& start) {
   // Lengths of edges and diagonals are sums of chords between the points of a lattice four times as fine.
   constexpr int finer = 4;
   Image<Eigen::Vector3d> lattice(finer * (columns_ - 1) + 1, finer * (rows_ - 1) + 1);
+  const std::vector<double> alphas = alphas_of(lattice.width(), finer);
   parallel_rows(lattice.height(), [&](int j) {
-    for (int i = 0; i < lattice.width(); ++i) lattice(i, j) = surface_point(double(i) / finer, double(j) / finer);
+    const double b = b_of(double(j) / finer);
+    for (int i = 0; i < lattice.width(); ++i) lattice(i, j) = surface_point(alphas[static_cast<std::size_t>(i)], b);
   });
   Sheet sheet{columns_, rows_, [&](double i, double j) {
                 return lattice(static_cast<int>(std::lround(finer * i)), static_cast<int>(std::lround(finer * j)));
@@ -187,9 +189,11 @@ double Strain::share_beyond(double least) const {
 void FlatPage::measure_strain() {
   Image<Eigen::Vector3d> measured(2 * columns_ - 1, 2 * rows_ - 1);  // nodes and what lies halfway
   Image<float> height_sigma(columns_, rows_, not_a_number);
+  const std::vector<double> alphas = alphas_of(measured.width(), 2);
+  const auto model_node = [&](int i, int j) { return model_.point(alphas[2 * static_cast<std::size_t>(i)], b_of(j)); };
   parallel_rows(measured.height(), [&](int j) {
     for (int i = 0; i < measured.width(); ++i) {
-      measured(i, j) = above(0.5 * i, 0.5 * j);
+      measured(i, j) = above(alphas[static_cast<std::size_t>(i)], b_of(0.5 * j));
       PixelStatus status = PixelStatus::not_computed;
       if (i % 2 == 0 && j % 2 == 0) look_up_status(measured(i, j), 1, height_sigma(i / 2, j / 2), status);
     }
@@ -203,7 +207,7 @@ void FlatPage::measure_strain() {
     const Eigen::Vector3d &a = measured(2 * i, 2 * j), &m = measured(i + i2, j + j2), &b = measured(2 * i2, 2 * j2);
     const double flat = (flat_(i2, j2) - flat_(i, j)).norm();
     const double length = (4 * ((m - a).norm() + (b - m).norm()) - (b - a).norm()) / 3;
-    const double chord = (model_point(i2, j2) - model_point(i, j)).norm();
+    const double chord = (model_node(i2, j2) - model_node(i, j)).norm();
     const double rise = std::sqrt(std::max(0.0, std::pow((b - a).norm() / chord, 2) - 1)), noise = sigma / flat;
     const Eigen::Vector3d edge(length / flat - 1, std::pow(rise * noise, 2) + std::pow(noise, 4), 1);
     sums(i, j) += edge;
@@ -283,15 +287,12 @@ void FlatPage::find_outline() {
 
 /// Grid position of a paper spot, by Newton's method.
 Eigen::Vector2d FlatPage::node_at(const Eigen::Vector2d& paper, Eigen::Vector2d guess) const {
+  constexpr double near = 1e-4;  // [nodes] a step of so much leaves about its square
   for (int step = 0; step < 8; ++step) {
-    const double h = 1e-4;
-    const Eigen::Vector2d here = interpolate_nodes(flat_, guess.x(), guess.y());
-    Eigen::Matrix2d jacobian;
-    jacobian.col(0) = (interpolate_nodes(flat_, guess.x() + h, guess.y()) - here) / h;
-    jacobian.col(1) = (interpolate_nodes(flat_, guess.x(), guess.y() + h) - here) / h;
-    const Eigen::Vector2d move = jacobian.inverse() * (paper - here);
+    const InterpolatedNode here = differentiate_nodes(flat_, guess.x(), guess.y());
+    const Eigen::Vector2d move = here.jacobian.inverse() * (paper - here.value);
     guess += move;
-    if (move.cwiseAbs().maxCoeff() < 1e-7) break;
+    if (move.cwiseAbs().maxCoeff() < near) break;
   }
   return guess;
 }
@@ -318,7 +319,8 @@ PageSurface FlatPage::sample(const PlanFrame& frame) const {
   page.status = Image<PixelStatus>(page.columns(), page.rows(), PixelStatus::not_computed);
   page.strain = page.strain_sigma = page.cover_mm = page.sigma;
   for_each_node(page, [&](int i, int j, const Eigen::Vector2d& node) {
-    const Eigen::Vector3d point = model_point(node.x(), node.y()), normal = model_normal(node.x(), node.y());
+    const double alpha = alpha_of(node.x()), b = b_of(node.y());
+    const Eigen::Vector3d point = model_.point(alpha, b), normal = model_.normal(alpha, b);
     const Eigen::Vector3d measured = measured_above(model_, differences_, point, normal);
     look_up_status(measured, normal.z(), page.sigma(i, j), page.status(i, j));
     page.cover_mm(i, j) = cover_above(measured);
@@ -335,9 +337,11 @@ PageSurface FlatPage::sample(const PlanFrame& frame) const {
 template <class Use>
 void FlatPage::for_each_node(const PageSurface& page, const Use& use) const {
   parallel_rows(page.rows(), [&](int j) {
-    Eigen::Vector2d node(0.5 * (columns_ - 1), 0.5 * (rows_ - 1));
+    Eigen::Vector2d node(0.5 * (columns_ - 1), 0.5 * (rows_ - 1)), step = Eigen::Vector2d::Zero();
     for (int i = 0; i < page.columns(); ++i) {
-      node = node_at({page.s_of(i), page.t_of(j)}, node);
+      const Eigen::Vector2d next = node_at({page.s_of(i), page.t_of(j)}, node + step);
+      if (i > 0) step = next - node;
+      node = next;
       use(i, j, node);
     }
   });
@@ -376,13 +380,14 @@ double FlatPage::interpolation_error(double spacing_mm) const {
     strip.t0_mm = page.t_of(j - 1);
     strip.model = Image<Eigen::Vector3f>(page.columns(), 4, Eigen::Vector3f::Zero());
     for_each_node(strip, [&](int i, int k, const Eigen::Vector2d& node) {
-      strip.model(i, k) = surface_point(node.x(), node.y()).cast<float>();
+      strip.model(i, k) = surface_point(alpha_of(node.x()), b_of(node.y())).cast<float>();
     });
     Eigen::Vector2d node(0.5 * (columns_ - 1), 0.5 * (rows_ - 1));
     for (int i = 0; i + 1 < page.columns(); ++i) {
       const double s = strip.s_of(i + 0.5), t = strip.t_of(1.5);
       node = node_at({s, t}, node);
-      largest = std::max(largest, (interpolate(strip, strip.model, s, t) - surface_point(node.x(), node.y())).norm());
+      const Eigen::Vector3d should = surface_point(alpha_of(node.x()), b_of(node.y()));
+      largest = std::max(largest, (interpolate(strip, strip.model, s, t) - should).norm());
     }
   }
   return largest;

@@ -56,10 +56,12 @@ class FlatPage {
   const Strain& strain() const { return strain_; }
 
  private:
-  Eigen::Vector3d model_point(double i, double j) const;
-  Eigen::Vector3d model_normal(double i, double j) const;
-  Eigen::Vector3d above(double i, double j) const;
-  Eigen::Vector3d surface_point(double i, double j) const { return follows_ ? above(i, j) : model_point(i, j); }
+  // Places on the model: those of a column of the grid share alpha, those of a row b.
+  double alpha_of(double i) const { return cut_.alpha_at(length0_ + i * length_step_); }
+  double b_of(double j) const { return b0_ + j * b_step_; }
+  std::vector<double> alphas_of(int columns, int finer) const;
+  Eigen::Vector3d above(double alpha, double b) const;
+  Eigen::Vector3d surface_point(double alpha, double b) const;
   void set_nodes(double spacing_mm);
   void measure_strain();
   void lay_flat(const Image<Eigen::Vector2d>& start);

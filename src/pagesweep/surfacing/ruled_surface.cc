@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -259,13 +260,12 @@ class RulingSearch {
     fit_quickly(first, search_stiffness, 0, 4);
     scatter_mm_ = scatter_of(first);
     RulingFrame best = start;
-    double best_cost = cost(best, start.angle_rad);
+    double best_cost = cost(best, start.angle_rad());
     if (!gutter_)
       for (const double turn : {0.25, 0.5, -0.25}) {
-        RulingFrame turned = start;
-        turned.angle_rad += turn * std::numbers::pi;
+        const RulingFrame turned = start.turned(turn * std::numbers::pi);
         // Rulings across the page must earn it.
-        if (const double c = cost(turned, turned.angle_rad); c < 0.5 * best_cost - 2) {
+        if (const double c = cost(turned, turned.angle_rad()); c < 0.5 * best_cost - 2) {
           best_cost = c;
           best = turned;
         }
@@ -275,7 +275,7 @@ class RulingSearch {
     Fit second = prepare(cells_, best, gutter_);
     fit_quickly(second, search_stiffness, 0, 4);
     scatter_mm_ = scatter_of(second);
-    return refine(best, cost(best, best.angle_rad));
+    return refine(best, cost(best, best.angle_rad()));
   }
 
  private:
@@ -284,15 +284,14 @@ class RulingSearch {
   static constexpr double largest_fan = 0.35;  // change of the rulings' distance over half the page
 
   RulingFrame refine(RulingFrame best, double best_cost) const {
-    const double preferred_angle = best.angle_rad;
+    const double preferred_angle = best.angle_rad();
     for (double step = 0.08; step > 5e-4; step *= 0.5)
       for (bool improved = true; improved;) {
         improved = false;
         for (const double sign : {1.0, -1.0})
           for (const bool turn : {true, false}) {
             if (turn && gutter_) continue;
-            RulingFrame trial = best;
-            (turn ? trial.angle_rad : trial.fan) += sign * step / (turn ? 1 : half_length_mm_);
+            const RulingFrame trial = turn ? best.turned(sign * step) : best.fanned(sign * step / half_length_mm_);
             if (std::abs(trial.fan) * half_length_mm_ > largest_fan) continue;
             if (const double c = cost(trial, preferred_angle); c < best_cost - 1e-4) {
               best_cost = c;
@@ -307,7 +306,7 @@ class RulingSearch {
   double cost(const RulingFrame& frame, double preferred_angle) const {
     Fit fit = prepare(cells_, frame, gutter_);
     const double mean = fit_quickly(fit, search_stiffness, scatter_mm_, 2);
-    const double turn = (frame.angle_rad - preferred_angle) / preference,
+    const double turn = (frame.angle_rad() - preferred_angle) / preference,
                  fan = frame.fan * half_length_mm_ / preference;
     // Neighbouring cells err alike: count one in thirty.
     return mean * static_cast<double>(cells_.size()) / 30 + turn * turn + fan * fan;
@@ -322,9 +321,8 @@ class RulingSearch {
 }  // namespace
 
 Eigen::Vector2d RulingFrame::ruling_from_plan(const Eigen::Vector2d& plan) const {
-  const double c = std::cos(angle_rad), s = std::sin(angle_rad);
   const Eigen::Vector2d from_origin = plan - origin;
-  const double a = c * from_origin.x() + s * from_origin.y(), b = c * from_origin.y() - s * from_origin.x();
+  const double a = across().dot(from_origin), b = along().dot(from_origin);
   return {a / (1 + fan * b), b};
 }
 
@@ -354,6 +352,22 @@ Eigen::Vector3d RuledSurface::point(double alpha, double b) const {
 double RuledSurface::height(const Eigen::Vector2d& plan) const {
   const Eigen::Vector2d place = frame.ruling_from_plan(plan);
   return at(place.x(), place.y()).z;
+}
+
+Eigen::Vector3d RuledSurface::normal(double alpha, double b) const {
+  const BSplineRow row = splines.at(alpha);
+  const double length = b_high - b_low, tau = (b - b_low) / length;
+  double rise_across = 0, rise_along = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto i = row.first + static_cast<Eigen::Index>(k);
+    rise_across += ((1 - tau) * low(i) + tau * high(i)) * row.slope[k];
+    rise_along += (high(i) - low(i)) / length * row.value[k];
+  }
+  const Eigen::Vector2d plan_across = (1 + frame.fan * b) * frame.across();
+  const Eigen::Vector2d plan_along = frame.fan * alpha * frame.across() + frame.along();
+  const Eigen::Vector3d across(plan_across.x(), plan_across.y(), rise_across);
+  const Eigen::Vector3d along(plan_along.x(), plan_along.y(), rise_along);
+  return across.cross(along).normalized();
 }
 
 double height_over(const RuledSurface& surface, const Support& cell) {

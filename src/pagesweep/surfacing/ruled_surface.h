@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
@@ -12,17 +13,29 @@ namespace pagesweep {
 
 /// Where the rulings of a page lie as seen from above. With b along the middle ruling and a to its right, both from
 /// `origin`, a ruling is the set of points with the same  alpha = a / (1 + fan b).
-struct RulingFrame {
+class RulingFrame {
+ public:
   Eigen::Vector2d origin{0, 0};  ///< [mm] plan coordinates (p, q)
-  double angle_rad = 0;          ///< of the middle ruling against the q axis, counter-clockwise
   double fan = 0;                ///< [1/mm] 0: parallel rulings; else they meet at b = -1 / fan
 
-  Eigen::Vector2d across() const { return {std::cos(angle_rad), std::sin(angle_rad)}; }
-  Eigen::Vector2d along() const { return {-std::sin(angle_rad), std::cos(angle_rad)}; }
+  RulingFrame() = default;
+  RulingFrame(const Eigen::Vector2d& origin_mm, double angle_rad, double fan_per_mm)
+      : origin(origin_mm), fan(fan_per_mm), angle_rad_(angle_rad), across_(std::cos(angle_rad), std::sin(angle_rad)) {}
+
+  /// Of the middle ruling against the q axis, counter-clockwise.
+  double angle_rad() const { return angle_rad_; }
+  RulingFrame turned(double by_rad) const { return {origin, angle_rad_ + by_rad, fan}; }
+  RulingFrame fanned(double by_per_mm) const { return {origin, angle_rad_, fan + by_per_mm}; }
+  Eigen::Vector2d across() const { return across_; }
+  Eigen::Vector2d along() const { return {-across_.y(), across_.x()}; }
   /// (alpha, b) of a place (p, q)
   Eigen::Vector2d ruling_from_plan(const Eigen::Vector2d& plan) const;
   /// (p, q) of (alpha, b)
   Eigen::Vector2d plan_from_ruling(double alpha, double b) const;
+
+ private:
+  double angle_rad_ = 0;
+  Eigen::Vector2d across_{1, 0};
 };
 
 /// The simplified surface model (paper section IV, step 1): straight rulings, and a cut profile that changes from the
@@ -45,6 +58,8 @@ struct RuledSurface {
   /// The point of the surface on ruling alpha at b, plan coordinates.
   Eigen::Vector3d point(double alpha, double b) const;
   double height(const Eigen::Vector2d& plan) const;
+  /// Of unit length, up, at the point on ruling alpha at b; plan coordinates.
+  Eigen::Vector3d normal(double alpha, double b) const;
 };
 
 /// A measured place of the page: the mean of a cell's points.

@@ -40,7 +40,7 @@ TEST(RuledSurface, FindsTheDirectionOfTheRulings) {
   EXPECT_LT(rms_error(surface, wave), 0.01);
   // The change of the profile takes up a wrong angle d but for d^2 b^2 z'' / 2, which for 0.015 rad is 0.02 mm at the
   // ends.
-  EXPECT_NEAR(surface.frame.angle_rad, turn, 0.015);
+  EXPECT_NEAR(surface.frame.angle_rad(), turn, 0.015);
   EXPECT_NEAR(surface.frame.fan, 0, 2e-4);
 }
 
@@ -84,6 +84,25 @@ TEST(RuledSurface, SlopesAgreeWithDifferences) {
 TEST(RuledSurface, NeedsSixPlaces) {
   const auto cells = places([](double, double) { return 0.0; }, 0.05);
   EXPECT_THROW(fit_ruled_surface(std::span(cells).first(5)), Error);
+}
+
+TEST(RuledSurface, NormalsStandOnItsPoints) {
+  RuledSurface surface;
+  surface.frame = {{3, -4}, 0.2, 1e-3};
+  surface.b_low = -100;
+  surface.b_high = 120;
+  surface.splines = CubicBSplines({0, 20, 50, 100});
+  surface.low = Eigen::VectorXd::LinSpaced(6, 0, 40).array().sin() * 5;
+  surface.high = Eigen::VectorXd::LinSpaced(6, 0, 30).array().cos() * 8;
+  constexpr double h = 1e-4;
+  for (const double alpha : {5.0, 33.0, 90.0})
+    for (const double b : {-80.0, 10.0, 110.0}) {
+      const Eigen::Vector3d normal = surface.normal(alpha, b);
+      EXPECT_NEAR(normal.norm(), 1, 1e-12);
+      EXPECT_GT(normal.z(), 0);
+      EXPECT_NEAR(normal.dot(surface.point(alpha + h, b) - surface.point(alpha - h, b)) / (2 * h), 0, 1e-6);
+      EXPECT_NEAR(normal.dot(surface.point(alpha, b + h) - surface.point(alpha, b - h)) / (2 * h), 0, 1e-6);
+    }
 }
 
 TEST(RulingFrame, GoesThereAndBack) {
