@@ -49,25 +49,36 @@ Image<float> close_print(const Image<float>& brightness, int reach) {
   return extreme(extreme(grown, reach, true, smaller), reach, false, smaller);
 }
 
-/// Otsu's threshold on the logarithm of the brightness; 0 if the two classes do not differ clearly.
+/// Otsu's threshold (1979) on the logarithm of the brightness; 0 if the two classes do not differ clearly.
 double split_brightness(const Image<float>& ground, const Image<std::uint8_t>& measured) {
-  std::vector<double> logs;
+  constexpr std::size_t bins = 1024;
+  std::vector<float> logs;
   for (std::size_t k = 0; k < ground.size(); ++k)
-    if (measured.data()[k] && ground.data()[k] > 0) logs.push_back(std::log(static_cast<double>(ground.data()[k])));
+    if (measured.data()[k] && ground.data()[k] > 0) logs.push_back(std::log(ground.data()[k]));
   if (logs.size() < 2) return 0;
-  std::ranges::sort(logs);
-  double total = 0;
-  for (const double x : logs) total += x;
-  const auto n = static_cast<double>(logs.size());
-  double below = 0, best = 0, threshold = 0, contrast = 1;
-  for (std::size_t k = 0; k + 1 < logs.size(); ++k) {
-    below += logs[k];
-    const auto m = static_cast<double>(k + 1);
-    const double difference = (total - below) / (n - m) - below / m;
-    const double between = m * (n - m) * difference * difference;
+  const auto [least, most] = std::ranges::minmax(logs);
+  if (!(most > least)) return 0;
+  struct Bin {
+    double count = 0, sum = 0;
+  };
+  std::array<Bin, bins> histogram{};
+  Bin all, below;
+  for (const float x : logs) {
+    Bin& bin = histogram[static_cast<std::size_t>((x - least) / (most - least) * (bins - 1))];
+    bin.count += 1;
+    bin.sum += x;
+    all.sum += x;
+  }
+  all.count = static_cast<double>(logs.size());
+  double best = 0, threshold = 0, contrast = 1;
+  for (std::size_t k = 0; k + 1 < bins; ++k) {
+    below.count += histogram[k].count;
+    below.sum += histogram[k].sum;
+    const double difference = (all.sum - below.sum) / (all.count - below.count) - below.sum / below.count;
+    const double between = below.count * (all.count - below.count) * difference * difference;
     if (between > best) {
       best = between;
-      threshold = 0.5 * (logs[k] + logs[k + 1]);
+      threshold = least + (static_cast<double>(k) + 1) * (most - least) / (bins - 1);
       contrast = std::exp(-difference);
     }
   }
@@ -275,10 +286,14 @@ class Pieces {
   void note_heights(Piece& piece) const {
     std::vector<float> heights;
     for (const int k : piece.cells) heights.push_back(field_.z.data()[k]);
-    std::ranges::sort(heights);
-    piece.lower_z = heights[heights.size() / 4];
-    piece.middle_z = heights[heights.size() / 2];
-    piece.upper_z = heights[heights.size() * 3 / 4];
+    const auto quantile = [&](std::size_t quarters) {
+      const auto at = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() * quarters / 4);
+      std::ranges::nth_element(heights, at);
+      return *at;
+    };
+    piece.lower_z = quantile(1);
+    piece.middle_z = quantile(2);
+    piece.upper_z = quantile(3);
   }
 
   /// The largest bright piece and what is comparable to it, but not a level ground well below it.

@@ -94,7 +94,11 @@ LocalFit LocalFit::moved(double u, double v) const {
 }
 
 Image<LocalFit> fit_lattice(const Image<CellMean>& cells, double cell_mm, int pitch, const LocalFitOptions& options) {
-  Image<LocalFit> fits((cells.width() - 1) / pitch + 1, (cells.height() - 1) / pitch + 1, LocalFit());
+  return fit_lattice(CellColumns(cells), cell_mm, pitch, options);
+}
+
+Image<LocalFit> fit_lattice(const CellColumns& cells, double cell_mm, int pitch, const LocalFitOptions& options) {
+  Image<LocalFit> fits((cells.width - 1) / pitch + 1, (cells.height - 1) / pitch + 1, LocalFit());
   parallel_rows(fits.height(), [&](int j) {
     LocalFitter fitter(cells, cell_mm);
     for (int i = 0; i < fits.width(); ++i)
@@ -105,9 +109,10 @@ Image<LocalFit> fit_lattice(const Image<CellMean>& cells, double cell_mm, int pi
 
 Image<LocalFit> refine_lattice(const Image<LocalFit>& coarse, const Image<CellMean>& cells, double cell_mm, int pitch,
                                const LocalFitOptions& options) {
+  const CellColumns columns(cells);
   Image<LocalFit> fits((cells.width() - 1) / pitch + 1, (cells.height() - 1) / pitch + 1, LocalFit());
   parallel_rows(fits.height(), [&](int j) {
-    LocalFitter fitter(cells, cell_mm);
+    LocalFitter fitter(columns, cell_mm);
     for (int i = 0; i < fits.width(); ++i) {
       const Surroundings surroundings(coarse, 2 * pitch, cell_mm, i * pitch, j * pitch);
       fits(i, j) =
@@ -121,10 +126,11 @@ Image<LocalFit> refine_lattice(const Image<LocalFit>& coarse, const Image<CellMe
 
 Image<LocalFit> fit_cells(const Image<CellMean>& cells, double cell_mm, const LocalFitOptions& options,
                           const Image<std::uint8_t>& wanted) {
-  const Image<LocalFit> lattice = fit_lattice(cells, cell_mm, fit_pitch, options);
+  const CellColumns columns(cells);
+  const Image<LocalFit> lattice = fit_lattice(columns, cell_mm, fit_pitch, options);
   Image<LocalFit> fits(cells.width(), cells.height(), LocalFit());
   parallel_rows(fits.height(), [&](int j) {
-    LocalFitter fitter(cells, cell_mm);
+    LocalFitter fitter(columns, cell_mm);
     for (int i = 0; i < fits.width(); ++i) {
       if (!wanted(i, j)) continue;
       if (cells(i, j).weight > 0)

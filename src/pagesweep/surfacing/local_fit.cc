@@ -24,39 +24,6 @@ std::array<float, 6> narrow(const Eigen::Matrix<double, Terms, 1>& coefficients)
 
 }  // namespace
 
-void LocalFitter::gather(int column, int row, const Neighbourhood& neighbourhood) {
-  const double r = neighbourhood.radius_mm, r2 = r * r;
-  const int reach = static_cast<int>(r / cell_mm_) + 1;
-  const bool one_sided = neighbourhood.towards.squaredNorm() > 0;
-  Window& w = window_;
-  w.reserve(static_cast<std::size_t>((2 * reach + 1) * (2 * reach + 1)));
-  double nearest = r2;
-  std::size_t n = 0;
-  for (int j = std::max(0, row - reach); j <= std::min(cells_.height() - 1, row + reach); ++j)
-    for (int i = std::max(0, column - reach); i <= std::min(cells_.width() - 1, column + reach); ++i) {
-      const CellMean& cell = cells_(i, j);
-      if (!(cell.weight > 0)) continue;
-      const double u = (i - column) * cell_mm_ + cell.p, v = (j - row) * cell_mm_ + cell.q;
-      const double d2 = (u * u + v * v) / r2;
-      if (d2 >= 1) continue;
-      if (one_sided && u * neighbourhood.towards.x() + v * neighbourhood.towards.y() < -0.75 * cell_mm_) continue;
-      nearest = std::min(nearest, u * u + v * v);
-      if (n == 0) w.z0_mm = cell.z;
-      w.u[n] = static_cast<float>(u / r);
-      w.v[n] = static_cast<float>(v / r);
-      w.uu[n] = static_cast<float>((u * u + cell.pp) / r2);
-      w.uv[n] = static_cast<float>((u * v + cell.pq) / r2);
-      w.vv[n] = static_cast<float>((v * v + cell.qq) / r2);
-      w.z[n] = static_cast<float>(cell.z - w.z0_mm);
-      w.weight[n] = cell.weight;
-      w.kernel[n] = static_cast<float>((1 - d2) * (1 - d2));
-      ++n;
-    }
-  w.size = n;
-  w.pad();
-  nearest_mm_ = std::sqrt(nearest);
-}
-
 template <int Terms>
 LocalFit LocalFitter::solve(double radius_mm, int steps) {
   using Vector = Eigen::Matrix<double, Terms, 1>;
@@ -66,7 +33,7 @@ LocalFit LocalFitter::solve(double radius_mm, int steps) {
   std::fill_n(window_.robust.begin(), window_.size, 1.0f);
   const double freedom = 1 - static_cast<double>(Terms) / static_cast<double>(window_.size);
   Vector solution = Vector::Zero();
-  Eigen::LDLT<Matrix> normal_equations;
+  Eigen::LLT<Matrix> normal_equations(Matrix::Identity());
   double total = 0;
   for (int step = 0; step <= steps; ++step) {
     const WindowSums sums = add_up(window_);
@@ -76,8 +43,8 @@ LocalFit LocalFitter::solve(double radius_mm, int steps) {
         if (column < Terms) a(row, column) = a(column, row) = sums.a[static_cast<std::size_t>(at)];
     total = sums.a[0];
     normal_equations.compute(a);
-    const auto pivots = normal_equations.vectorD();
-    if (!(pivots.minCoeff() > 1e-9 * pivots.maxCoeff())) return fit;
+    const auto pivots = normal_equations.matrixLLT().diagonal();  // their roots
+    if (normal_equations.info() != Eigen::Success || !(pivots.minCoeff() > 3e-5 * pivots.maxCoeff())) return fit;
     solution = normal_equations.solve(Eigen::Map<const Vector>(sums.b.data()));
     if (step == steps && steps > 0) break;
     find_residuals(narrow(solution), window_);
@@ -98,9 +65,11 @@ LocalFit LocalFitter::solve(double radius_mm, int steps) {
 }
 
 LocalFit LocalFitter::fit(int column, int row, const Neighbourhood& neighbourhood, int steps) {
-  gather(column, row, neighbourhood);
+  const double nearest_mm = gather(
+      cells_, {column, row, cell_mm_, neighbourhood.radius_mm, neighbourhood.towards.x(), neighbourhood.towards.y()},
+      window_);
   // A fit may bridge a gap of a few cells, not more.
-  if (window_.size == 0 || nearest_mm_ > std::max(0.35 * neighbourhood.radius_mm, 1.5 * cell_mm_)) return {};
+  if (window_.size == 0 || nearest_mm > std::max(0.35 * neighbourhood.radius_mm, 1.5 * cell_mm_)) return {};
   if (const LocalFit paraboloid = solve<6>(neighbourhood.radius_mm, steps); paraboloid.ok) return paraboloid;
   return solve<3>(neighbourhood.radius_mm, steps);
 }

@@ -11,16 +11,6 @@
 
 namespace pagesweep {
 
-/// The points of one cell of a grid, summed up. A cell without points has weight 0.
-struct CellMean {
-  float p = 0, q = 0;            ///< [mm] mean position against the cell's centre
-  float z = 0;                   ///< [mm] mean height
-  float pp = 0, pq = 0, qq = 0;  ///< [mm^2] covariance of the positions within the cell
-  float weight = 0;              ///< [1/mm^2] sum of 1/sigma^2
-  float intensity = 0;           ///< [gray values] mean
-  int count = 0;                 ///< of points
-};
-
 /// z(u, v) = z + a u + b v + c u^2 + d u v + e v^2 around a cell's centre, (u, v) [mm] along (p, q).
 struct LocalFit {
   bool ok = false;
@@ -50,7 +40,7 @@ class LocalFitter {
     Eigen::Vector2d towards = Eigen::Vector2d::Zero();
   };
   /// \param cells  must outlive the fitter
-  LocalFitter(const Image<CellMean>& cells, double cell_mm) : cells_(cells), cell_mm_(cell_mm) {}
+  LocalFitter(const CellColumns& cells, double cell_mm) : cells_(cells), cell_mm_(cell_mm) {}
 
   /// \param steps  robust steps: 0 is plain least squares, 2 suffice for clean cells, 6 start from nothing
   LocalFit fit(int column, int row, const Neighbourhood& neighbourhood, int steps);
@@ -59,14 +49,12 @@ class LocalFitter {
   LocalFit fit_along_edges(int column, int row, double radius_mm, int steps, double too_much);
 
  private:
-  void gather(int column, int row, const Neighbourhood& neighbourhood);
   template <int Terms>
   LocalFit solve(double radius_mm, int steps);
 
-  const Image<CellMean>& cells_;
+  const CellColumns& cells_;
   double cell_mm_;
   Window window_;
-  double nearest_mm_ = 0;
 };
 
 /// How fit_cells() fits.
@@ -79,6 +67,7 @@ struct LocalFitOptions {
 
 /// Fits to the cells (i * pitch, j * pitch).
 Image<LocalFit> fit_lattice(const Image<CellMean>& cells, double cell_mm, int pitch, const LocalFitOptions& options);
+Image<LocalFit> fit_lattice(const CellColumns& cells, double cell_mm, int pitch, const LocalFitOptions& options);
 
 /// The same from a lattice of twice the pitch: blended where the surface is smooth, fitted elsewhere.
 Image<LocalFit> refine_lattice(const Image<LocalFit>& coarse, const Image<CellMean>& cells, double cell_mm, int pitch,

@@ -52,7 +52,52 @@ TEST(WindowSums, AgreeWithPlainLoopsOnAllInstructionSets) {
 
       std::vector<float> sorted(w.residual.begin(), w.residual.begin() + static_cast<std::ptrdiff_t>(size));
       std::ranges::sort(sorted);
-      EXPECT_NEAR(median_residual(w), sorted[size / 2], 1e-3) << hwy::TargetName(target);
+      EXPECT_NEAR(median_residual(w), sorted[size / 2], 5e-3) << hwy::TargetName(target);  // of a mean of 0.5
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+TEST(WindowSums, GatherTheCellsOfACircleOrOfOneSideOfIt) {
+  const scenes::Noise noise(3);
+  Image<CellMean> cells(30, 21);
+  std::uint64_t counter = 0;
+  for (CellMean& cell : cells.pixels()) {
+    for (float* value : {&cell.p, &cell.q, &cell.z, &cell.pp, &cell.pq, &cell.qq})
+      *value = static_cast<float>(noise.uniform(counter++) - 0.5);
+    cell.weight = noise.uniform(counter++) < 0.2 ? 0.0f : 2.0f;
+  }
+  const CellColumns columns(cells);
+  for (const auto target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    for (const WindowPlace& place :
+         {WindowPlace{15, 10, 1, 6}, {0, 0, 1, 6}, {29, 20, 1, 5.5}, {13, 4, 1, 6, 0.6, -0.8}}) {
+      Window window;
+      const double nearest = gather(columns, place, window);
+      std::size_t n = 0;
+      double should_be_nearest = place.radius_mm;
+      for (int j = 0; j < 21; ++j)
+        for (int i = 0; i < 30; ++i) {
+          const CellMean& cell = cells(i, j);
+          const double u = i - place.column + double(cell.p), v = j - place.row + double(cell.q), r = place.radius_mm;
+          const bool behind = u * place.towards_p + v * place.towards_q < -0.75;
+          if (!(cell.weight > 0) || std::hypot(u, v) >= r || behind) continue;
+          should_be_nearest = std::min(should_be_nearest, std::hypot(u, v));
+          ASSERT_LT(n, window.size) << hwy::TargetName(target);
+          EXPECT_NEAR(window.u[n], u / r, 1e-6);
+          EXPECT_NEAR(window.v[n], v / r, 1e-6);
+          EXPECT_NEAR(window.uu[n], (u * u + cell.pp) / (r * r), 1e-6);
+          EXPECT_NEAR(window.uv[n], (u * v + cell.pq) / (r * r), 1e-6);
+          EXPECT_NEAR(window.vv[n], (v * v + cell.qq) / (r * r), 1e-6);
+          EXPECT_NEAR(window.z[n] + window.z0_mm, cell.z, 1e-6);
+          EXPECT_EQ(window.weight[n], cell.weight);
+          EXPECT_NEAR(window.kernel[n], std::pow(1 - (u * u + v * v) / (r * r), 2), 1e-6);
+          ++n;
+        }
+      EXPECT_EQ(window.size, n) << hwy::TargetName(target);
+      EXPECT_NEAR(nearest, should_be_nearest, 1e-5);
     }
   }
   hwy::SetSupportedTargetsForTest(0);
@@ -72,7 +117,8 @@ TEST(FitCells, BlendsToWhatFitsOfTheirOwnSay) {
       cell.count = 1;
     }
   const Image<LocalFit> fits = fit_cells(cells, 1, {.radius_mm = 6}, Image<std::uint8_t>(40, 37, 1));
-  LocalFitter fitter(cells, 1);
+  const CellColumns columns(cells);
+  LocalFitter fitter(columns, 1);
   for (int j = 0; j < 37; ++j)
     for (int i = 0; i < 40; ++i) {
       const LocalFit own = fitter.fit(i, j, {6}, 2);

@@ -223,7 +223,8 @@ bool is_inlier(const PlanPoint& point, const Image<LocalFit>& fits, const Height
     if (!fits.contains(i, j) || !fits(i, j).ok) continue;
     const double u = point.p - field.p_of(i * first_pass_step), v = point.q - field.q_of(j * first_pass_step);
     const double residual = point.z - fits(i, j).at(u, v);
-    if (std::abs(residual) < outlier_sigmas * std::hypot(own, fits(i, j).scatter_mm)) return true;
+    const double scatter_mm = fits(i, j).scatter_mm;
+    if (residual * residual < outlier_sigmas * outlier_sigmas * (own * own + scatter_mm * scatter_mm)) return true;
   }
   return false;
 }

@@ -5,7 +5,36 @@
 #include <cstddef>
 #include <vector>
 
+#include "pagesweep/base/image.h"
+
 namespace pagesweep {
+
+/// The points of one cell of a grid, summed up. A cell without points has weight 0.
+struct CellMean {
+  float p = 0, q = 0;            ///< [mm] mean position against the cell's centre
+  float z = 0;                   ///< [mm] mean height
+  float pp = 0, pq = 0, qq = 0;  ///< [mm^2] covariance of the positions within the cell
+  float weight = 0;              ///< [1/mm^2] sum of 1/sigma^2
+  float intensity = 0;           ///< [gray values] mean
+  int count = 0;                 ///< of points
+};
+
+/// What a fit needs of a grid's cells, one image an attribute, so that vectors hold neighbouring cells. Each row goes
+/// on with some cells that have no points.
+struct CellColumns {
+  explicit CellColumns(const Image<CellMean>& cells);
+
+  int width, height;  ///< of the grid
+  Image<float> p, q, z, pp, pq, qq, weight;
+};
+
+/// Which cells of a grid belong to a window: those nearer to the middle of cell (column, row) than the radius and, if
+/// `towards` is not zero, not more than three quarters of a cell behind it.
+struct WindowPlace {
+  int column, row;
+  double cell_mm, radius_mm;
+  double towards_p = 0, towards_q = 0;
+};
 
 /// The cells of one neighbourhood, one column an attribute, so that vectors hold neighbouring cells. Positions are over
 /// the neighbourhood's radius.
@@ -23,8 +52,7 @@ struct Window {
   /// To be called after the last cell: whole vectors are read, and cells beyond the last one weigh nothing.
   void pad();
 
- private:
-  static constexpr std::size_t slack = 8;
+  static constexpr std::size_t slack = 8;  ///< what a whole vector may reach over the end
 };
 
 /// The normal equations sum_i w_i x_i x_i' c = sum_i w_i z_i x_i with rows x = (1, u, v, uu, uv, vv) and
@@ -36,11 +64,15 @@ struct WindowSums {
 };
 WindowSums add_up(const Window& window);
 
+/// Fills a window with cells, all but its robust weights. \return distance [mm] of the nearest one; the radius if there
+/// is none
+double gather(const CellColumns& cells, const WindowPlace& place, Window& window);
+
 /// Puts |z - fit| sqrt(weight) into window.residual.
 /// \param coefficients  of (1, u, v, uu, uv, vv)
 void find_residuals(const std::array<float, 6>& coefficients, Window& window);
 
-/// Median of window.residual, to a two-thousandth of their mean.
+/// Median of window.residual, to a hundredth of their mean.
 double median_residual(const Window& window);
 
 /// Puts weights by residual / unit into window.robust: Tukey's biweight, or those of least absolute values beyond 1.
