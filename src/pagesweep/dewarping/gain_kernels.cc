@@ -53,8 +53,8 @@ void MultiplyLight(const ToneTables& tones, std::span<const float> gains, std::s
   const Tag d;
   const hn::RebindToSigned<Tag> di;
   const hn::Rebind<T, Tag> dt;
-  const Vec cells = hn::Set(d, ToneTables::cells);
-  const auto last = hn::Set(di, ToneTables::cells - 1);
+  const Vec cells = hn::Set(d, static_cast<float>(tones.cells));
+  const auto last = hn::Set(di, tones.cells - 1);
   for (std::size_t k = 0; k < samples.size(); k += hn::Lanes(d)) {
     const auto before = hn::PromoteTo(di, hn::LoadU(dt, &samples[k]));
     const Vec gain = hn::LoadU(d, &gains[k]);
@@ -89,7 +89,8 @@ HWY_EXPORT(SpreadGains);
 HWY_EXPORT(MultiplyLight8);
 HWY_EXPORT(MultiplyLight16);
 
-ToneTables::ToneTables(const TransferCurve& curve, int bit_depth) : light(curve.table(bit_depth)) {
+ToneTables::ToneTables(const TransferCurve& curve, int bit_depth)
+    : cells(bit_depth > 8 ? 1 << 14 : 1 << 11), light(curve.table(bit_depth)) {
   const int white = (1 << bit_depth) - 1;
   for (int k = 0; k <= cells; ++k)
     samples.push_back(static_cast<float>(curve.sample(std::pow(double(k) / cells, 2)) * white));

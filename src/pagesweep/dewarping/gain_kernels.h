@@ -17,10 +17,9 @@ constexpr float left_alone = -1;
 
 /// What turns samples into light, and light into samples.
 struct ToneTables {
-  static constexpr int cells = 1 << 14;
-
   ToneTables(const TransferCurve& curve, int bit_depth);
 
+  int cells;                   ///< a thousandth of a gray value is enough, and a table that a core has at hand is fast
   std::vector<float> light;    ///< of every sample
   std::vector<float> samples;  ///< of the light (k / cells)^2: steps are fine where curves are steep
 };

@@ -107,32 +107,36 @@ ChannelLight GutterGlow::at(const Eigen::Vector2d& paper_mm, const Eigen::Vector
   const double side = page_.surface().gutter_at_left ? -1 : 1;  // s grows towards the gutter, or away from it
   const Eigen::Vector3d along_s = page_.point(paper_mm + Eigen::Vector2d(1, 0)) - point_mm;
   if (inwards.dot(along_s) * side < 0) inwards = -inwards;
-  const auto angle_of = [&](const Eigen::Vector3f& node, double& distance) {
+  struct Direction {
+    double distance_mm;
+    double sine;  // of the angle from the normal towards the gutter: all that is asked of it; +-1 where that is obtuse
+  };
+  const auto direction_to = [&](const Eigen::Vector3f& node) -> Direction {
     const Eigen::Vector3d arm = node.cast<double>() - point_mm;
     const double across = arm.dot(inwards), above = arm.dot(upright);
-    distance = std::hypot(across, above);
-    return std::atan2(across, above);
+    const double distance = std::sqrt(across * across + above * above);
+    return {distance, above > 0 ? across / distance : std::copysign(1.0, across)};
   };
 
-  double horizon = 0.5 * std::numbers::pi, distance = 0;
+  double horizon = 1;
   const int own_row = row_beside(page_, point_mm, frame.normal);
   const int step = page_.surface().gutter_at_left ? -1 : 1;
   const double column = (paper_mm.x() - page_.surface().s0_mm) / page_.surface().spacing_mm;
   for (int i = static_cast<int>(std::lround(column)); i >= 0 && i < own.width(); i += step)
-    if (const double angle = angle_of(own(i, own_row), distance); distance > own_reach_mm && angle > 0)
-      horizon = std::min(horizon, angle);
+    if (const auto [distance, sine] = direction_to(own(i, own_row)); distance > own_reach_mm && sine > 0)
+      horizon = std::min(horizon, sine);
 
   const Image<Eigen::Vector3f>& nodes = facing_.nodes();
   const int row = row_beside(facing_, point_mm, frame.normal);
   for (int i = gutter_column(facing_.surface()); i >= 0 && i < nodes.width(); i += step) {
-    const double angle = angle_of(nodes(i, row), distance);
-    if (distance > reach_mm || angle < -0.5 * std::numbers::pi) break;
-    if (distance < nearest_mm || !(angle < horizon)) continue;
+    const auto [distance, sine] = direction_to(nodes(i, row));
+    if (distance > reach_mm || sine == -1) break;
+    if (distance < nearest_mm || !(sine < horizon)) continue;
     if (i != gutter_column(facing_.surface())) {
-      const double share = 0.5 * (std::sin(horizon) - std::sin(angle)) * share_at(distance);
+      const double share = 0.5 * (horizon - sine) * share_at(distance);
       for (std::size_t c = 0; c < 3; ++c) glow[c] += share * static_cast<double>(sent_(i, row)[c]);
     }
-    horizon = angle;
+    horizon = sine;
   }
   return glow;
 }

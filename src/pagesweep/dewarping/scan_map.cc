@@ -44,6 +44,7 @@ class Lattice {
       for (int a = 0; a < 4; ++a)
         if (!nodes_(i + a, j + b).allFinite()) return false;
     if (!seen_(i + 1, j + 1) || !seen_(i + 2, j + 1) || !seen_(i + 1, j + 2) || !seen_(i + 2, j + 2)) return false;
+    if (is_bent_evenly(i, j, tolerance_px)) return true;
     const auto middle = see((i + 0.5) * pitch_, (j + 0.5) * pitch_);
     return middle &&
            (interpolate_at(i, j, catmull_rom_weights(0.5), catmull_rom_weights(0.5)) - *middle).norm() <= tolerance_px;
@@ -74,6 +75,22 @@ class Lattice {
   }
 
  private:
+  /// Whether the third differences of the nodes around a cell are within the tolerance. A cubic between nodes errs by
+  /// an eighth of them at most, so that the middle need not be asked.
+  bool is_bent_evenly(int i, int j, double tolerance_px) const {
+    double largest = 0;
+    const auto look = [&](int a, int b, int da, int db) {
+      const Eigen::Vector2d third =
+          nodes_(a + 3 * da, b + 3 * db) - nodes_(a, b) + 3 * (nodes_(a + da, b + db) - nodes_(a + 2 * da, b + 2 * db));
+      largest = std::max(largest, third.cwiseAbs().maxCoeff());
+    };
+    for (int k = 0; k < 4; ++k) {
+      look(i + k, j, 0, 1);
+      look(i, j + k, 1, 0);
+    }
+    return largest < tolerance_px;
+  }
+
   bool is_seen(const Eigen::Vector2d& paper, const Eigen::Vector3d& point, const Eigen::Vector2d& pixel) const {
     return view_.is_on_page(paper) && view_.scanner().sees(pixel) && !occlusion_.hides(view_.scanner(), point, pixel);
   }
