@@ -33,12 +33,10 @@ double count_points(const Image<float>& depths) {
 double scatter(const Image<float>& depths) {
   constexpr int stride = 5, radius = 4;
   std::vector<float> distances;
-  Neighbourhood around;
   for (int y = 0; y < depths.height(); y += stride)
     for (int x = 0; x < depths.width(); x += stride) {
       if (!std::isfinite(depths(x, y))) continue;
-      around.gather(depths, x, y, radius);
-      if (const auto plane = around.fit_robustly()) distances.push_back(std::abs(plane->middle));
+      if (const auto plane = fit_plane(depths, x, y, radius)) distances.push_back(std::abs(plane->middle));
     }
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   if (middle == distances.end()) return not_a_number;

@@ -139,11 +139,8 @@ class TieFinder {
   }
 
   std::optional<TiePoint> smooth(int x, int y) const {
-    Neighbourhood around;
-    around.gather(inverse_depth_, x, y, plane_radius_px);
-    const auto depth = around.fit_robustly();
-    around.gather(view_.first_times.time, x, y, plane_radius_px);
-    const auto time = around.fit_robustly();
+    const auto depth = fit_plane(inverse_depth_, x, y, plane_radius_px);
+    const auto time = fit_plane(view_.first_times.time, x, y, plane_radius_px);
     const auto ray = view_.first.ray({x, y});
     if (!depth || !time || !ray) return std::nullopt;
     TiePoint tie;
@@ -198,9 +195,7 @@ class TieFinder {
     const TimeMap& times = view_.second_times;
     const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
     if (!times.time.contains(x, y) || times.status(x, y) != PixelStatus::ok) return std::nullopt;
-    Neighbourhood around;
-    around.gather(times.time, x, y, plane_radius_px);
-    const auto plane = around.fit_robustly();
+    const auto plane = fit_plane(times.time, x, y, plane_radius_px);
     if (!plane) return std::nullopt;
     const Eigen::Vector2d direction(-plane->down, plane->across);
     const double length = direction.dot(across);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -62,17 +61,28 @@ struct ScanPatch {
   Eigen::Matrix2f by_pixel;
 };
 
-std::optional<ScanPatch> patch_around(const ScanPositions& positions, Neighbourhood& around, int x, int y) {
-  constexpr int radius = 2;
-  around.gather(positions.u, x, y, radius);
-  const auto u = around.fit_robustly();
-  around.gather(positions.v, x, y, radius);
-  const auto v = around.fit_robustly();
-  if (!u || !v) return std::nullopt;
-  ScanPatch patch{{positions.u(x, y) + u->middle, positions.v(x, y) + v->middle}, {}};
-  patch.by_pixel << u->across, u->down, v->across, v->down;
-  return patch;
-}
+/// The patches around pixels of one row; NaN where they are not known.
+class Patches {
+ public:
+  explicit Patches(const ScanPositions& positions) : positions_(positions) {}
+
+  void look(const PlaneBatch& pixels) {
+    u_ = v_ = pixels;
+    fitter_.fit(positions_.u, u_);
+    fitter_.fit(positions_.v, v_);
+  }
+  ScanPatch operator[](std::size_t k) const {
+    const int x = u_.column[k], y = u_.row;
+    ScanPatch patch{{positions_.u(x, y) + u_.middle[k], positions_.v(x, y) + v_.middle[k]}, {}};
+    patch.by_pixel << u_.across[k], u_.down[k], v_.across[k], v_.down[k];
+    return patch;
+  }
+
+ private:
+  const ScanPositions& positions_;
+  PlaneFitter fitter_{2};
+  PlaneBatch u_, v_;
+};
 
 /// The lowest and highest light around every place of the scan, for a quick answer to whether something is printed.
 class Contrast {
@@ -163,21 +173,29 @@ SpotOffsets weigh_footprints(const PointMap& points, const Scanner& scanner, con
   const float usual_px = 3 * sigma_px * typical_step(positions);
   const Contrast contrast(light, 1.5f * usual_px);
   SpotOffsets offsets(points.width(), points.height());
-  parallel_rows(points.height(), [&](int y) {
-    Neighbourhood around;
-    for (int x = 0; x < points.width(); ++x) {
-      const Eigen::Vector2f middle_px(positions.u(x, y), positions.v(x, y));
-      if (!std::isfinite(middle_px.x())) continue;
-      // A sharp edge through the middle would move it by sqrt(2 / pi) sigma contrast: no way to get further.
-      if (0.8f * sigma_px * contrast.around(middle_px) < negligible_px) {
+  // A sharp edge through the middle would move it by sqrt(2 / pi) sigma contrast: no way to get further.
+  const auto matters = [&](const Eigen::Vector2f& place) {
+    return !(0.8f * sigma_px * contrast.around(place) < negligible_px);
+  };
+  constexpr int rows_at_once = 8;
+  parallel_ranges(points.height(), rows_at_once, [&](int begin, int end) {
+    Patches patches(positions);
+    for (int y = begin; y < end; ++y) {
+      const auto is_worth_it = [&](int x) {
+        const Eigen::Vector2f place(positions.u(x, y), positions.v(x, y));
+        if (!std::isfinite(place.x())) return false;
+        if (matters(place)) return true;
         offsets.dx(x, y) = offsets.dy(x, y) = 0;
-        continue;
-      }
-      const auto patch = patch_around(positions, around, x, y);
-      if (!patch) continue;
-      const Eigen::Vector2f middle = middle_of(static_cast<float>(spot_variance_px2), *patch, light);
-      offsets.dx(x, y) = middle.x();
-      offsets.dy(x, y) = middle.y();
+        return false;
+      };
+      in_batches(points.width(), y, is_worth_it, [&](const PlaneBatch& pixels) {
+        patches.look(pixels);
+        for (std::size_t k = 0; k < pixels.count; ++k) {
+          const Eigen::Vector2f middle = middle_of(static_cast<float>(spot_variance_px2), patches[k], light);
+          offsets.dx(pixels.column[k], y) = middle.x();
+          offsets.dy(pixels.column[k], y) = middle.y();
+        }
+      });
     }
   });
   return offsets;

@@ -194,9 +194,8 @@ void PointStream::fuse(double until) {
   if (!step_on(located, until) || !sweep_) return;
   const MatchPair& matches = matching_.matches();
   for (std::size_t c = 0; c < sides_.size(); ++c)
-    sides_[c].fusion +=
-        fuse_light(sides_[c].points, c == 0 ? matches.from_first : matches.from_second, times(c), cameras_[c],
-                   cameras_[1 - c], sweep_->light, options_.triangulation, &sides_[c].now, &stereo[c]);
+    sides_[c].fusion += fuse_light(sides_[c].points, c == 0 ? matches.from_first : matches.from_second, times(c),
+                                   cameras_[c], sweep_->light, options_.triangulation, &sides_[c].now, &stereo[c]);
 }
 
 void PointStream::fit_normals(double until) {

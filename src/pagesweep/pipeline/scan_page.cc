@@ -91,9 +91,8 @@ void fuse(const MatchPair& matches, const Stage& stage, Measurement& measurement
   if (!measurement.sweep) return;
   const Light& light = measurement.sweep->light;
   const TriangulationOptions& options = stage.options.triangulation;
-  measurement.fusion = {
-      fuse_light(measurement.points[0], matches.from_first, times[0], cameras[0], cameras[1], light, options),
-      fuse_light(measurement.points[1], matches.from_second, times[1], cameras[1], cameras[0], light, options)};
+  measurement.fusion = {fuse_light(measurement.points[0], matches.from_first, times[0], cameras[0], light, options),
+                        fuse_light(measurement.points[1], matches.from_second, times[1], cameras[1], light, options)};
 }
 
 /// Whether points can be found while the stripe is on its way.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 
 #include "pagesweep/base/local_plane.h"
@@ -28,47 +27,54 @@ class Surroundings {
  public:
   Surroundings(const TimeMap& times, const SpotOffsets& offsets) : times_(times), offsets_(offsets) {}
 
-  /// Nothing if there is nothing to compare.
-  std::optional<EdgeComparison> look(int x, int y) {
+  /// Whether there may be something to compare.
+  bool are_worth_it(int x, int y) const {
     const float dx = offsets_.dx(x, y), dy = offsets_.dy(x, y);
-    if (times_.status(x, y) != PixelStatus::ok || !(std::abs(dx) + std::abs(dy) < largest_offset_px))
-      return std::nullopt;
-    const auto [least, most] = frames_a_pixel(x, y);
-    if (std::hypot(dx, dy) * most < least_leaning * times_.sigma(x, y)) return std::nullopt;
-    around_.gather(times_.time, x, y, radius);
-    const auto plane = around_.fit_robustly();
-    if (!plane) return std::nullopt;
-    return EdgeComparison{x,
-                          y,
-                          -plane->middle,
-                          dx * plane->across + dy * plane->down,
-                          std::hypot(dx, dy),
-                          least,
-                          is_one_surface(*plane, times_.time, times_.sigma, x, y, radius)};
+    if (times_.status(x, y) != PixelStatus::ok || !(std::abs(dx) + std::abs(dy) < largest_offset_px)) return false;
+    const float least = least_leaning * times_.sigma(x, y);
+    return !((dx * dx + dy * dy) * frames_a_pixel_squared(x, y).most < least * least);
+  }
+
+  /// What is compared of the pixels of a row that are worth it.
+  void look(PlaneBatch& planes, EdgeComparisons& comparisons) {
+    fitter_.fit(times_.time, planes);
+    const auto are_one_surface = fitter_.are_one_surface(times_.sigma, planes);
+    for (std::size_t k = 0; k < planes.count; ++k) {
+      if (!planes.found(k)) continue;
+      const int x = planes.column[k], y = planes.row;
+      const float dx = offsets_.dx(x, y), dy = offsets_.dy(x, y);
+      comparisons.push_back({x, y, -planes.middle[k], dx * planes.across[k] + dy * planes.down[k],
+                             std::sqrt(dx * dx + dy * dy), std::sqrt(frames_a_pixel_squared(x, y).least),
+                             are_one_surface[k]});
+    }
   }
 
  private:
-  static constexpr int radius = 3;
-
   struct Range {
     float least, most;
   };
-  /// What the stripe takes from pixel to pixel: from the more equal of the neighbours on either side, as between the
-  /// others there may be a step, and from the less equal ones.
-  Range frames_a_pixel(int x, int y) const {
+  /// What the stripe takes from pixel to pixel, squared: from the more equal of the neighbours on either side, as
+  /// between the others there may be a step, and from the less equal ones.
+  Range frames_a_pixel_squared(int x, int y) const {
     const auto difference = [&](int dx, int dy) {
       const bool inside = times_.time.contains(x + dx, y + dy);
       return inside ? std::abs(times_.time(x + dx, y + dy) - times_.time(x, y)) : not_a_number;
     };
-    const auto number = [](float value) { return std::isfinite(value) ? value : 0; };  // fmin, fmax pass over one NaN
-    const float right = difference(1, 0), left = difference(-1, 0), below = difference(0, 1), above = difference(0, -1);
-    return {std::hypot(number(std::fmin(right, left)), number(std::fmin(below, above))),
-            std::hypot(number(std::fmax(right, left)), number(std::fmax(below, above)))};
+    const Range across = range_of(difference(1, 0), difference(-1, 0));
+    const Range down = range_of(difference(0, 1), difference(0, -1));
+    return {across.least * across.least + down.least * down.least, across.most * across.most + down.most * down.most};
+  }
+  /// One that is NaN says nothing; two say 0.
+  static Range range_of(float a, float b) {
+    const bool has_a = !std::isnan(a), has_b = !std::isnan(b);
+    if (has_a && has_b) return {std::min(a, b), std::max(a, b)};
+    const float only = has_a ? a : has_b ? b : 0;
+    return {only, only};
   }
 
   const TimeMap& times_;
   const SpotOffsets& offsets_;
-  Neighbourhood around_;
+  PlaneFitter fitter_{3};
 };
 
 }  // namespace
@@ -103,11 +109,13 @@ EdgeComparisons compare_with_surroundings(const TimeMap& times, const SpotOffset
   if (times.width() != offsets.width() || times.height() != offsets.height())
     throw std::invalid_argument("edge correction: time map and offsets differ in size");
   std::vector<EdgeComparisons> rows(static_cast<std::size_t>(times.height()));
-  parallel_rows(times.height(), [&](int y) {
+  constexpr int rows_at_once = 8;
+  parallel_ranges(times.height(), rows_at_once, [&](int begin, int end) {
     Surroundings surroundings(times, offsets);
-    for (int x = 0; x < times.width(); ++x) {
-      if (!takes_part(only, x, y)) continue;
-      if (const auto seen = surroundings.look(x, y)) rows[static_cast<std::size_t>(y)].push_back(*seen);
+    for (int y = begin; y < end; ++y) {
+      const auto are_worth_it = [&](int x) { return takes_part(only, x, y) && surroundings.are_worth_it(x, y); };
+      in_batches(times.width(), y, are_worth_it,
+                 [&](PlaneBatch& planes) { surroundings.look(planes, rows[static_cast<std::size_t>(y)]); });
     }
   });
   EdgeComparisons all;

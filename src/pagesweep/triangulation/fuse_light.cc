@@ -3,7 +3,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -20,7 +22,7 @@ namespace {
 /// pixels beside bright ones seem to say is the bright ones' stray light.
 class Lateness {
  public:
-  Lateness(const PointMap& points, const TimeMap& times, const Light& light, const PixelSet* stereo)
+  Lateness(const PointMap& points, const TimeMap& times, const SeenLight& light, const PixelSet* stereo)
       : tiles_((times.width() + tile - 1) / tile, (times.height() + tile - 1) / tile) {
     parallel_rows(tiles_.height(), [&](int row) {
       std::vector<Voice> voices;
@@ -62,14 +64,14 @@ class Lateness {
     float weight = 0;  ///< [1/frames^2]
   };
 
-  static void gather(const PointMap& points, const TimeMap& times, const Light& light, const PixelSet* stereo,
+  static void gather(const PointMap& points, const TimeMap& times, const SeenLight& light, const PixelSet* stereo,
                      int column, int row, std::vector<Voice>& voices) {
     voices.clear();
     const int right = std::min((column + 1) * tile, times.width()), bottom = std::min((row + 1) * tile, times.height());
     for (int y = row * tile; y < bottom; ++y)
       for (int x = column * tile; x < right; ++x) {
         if (!takes_part(stereo, x, y) || points.status(x, y) != PixelStatus::ok) continue;
-        const auto time = light.time_of({points.x(x, y), points.y(x, y), points.z(x, y)});
+        const auto time = light.time_of({points.x(x, y), points.y(x, y), points.z(x, y)}, times.time(x, y));
         if (time)
           voices.push_back({static_cast<float>(times.time(x, y) - *time), 1 / (times.sigma(x, y) * times.sigma(x, y))});
       }
@@ -138,63 +140,91 @@ bool may_be_sectioned(PixelStatus status) {
 class Fusion {
  public:
   Fusion(const PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
-         const Camera& to, const Light& light, const TriangulationOptions& options, const PixelSet* stereo)
+         const Light& light, const TriangulationOptions& options, const PixelSet* stereo)
       : matches_(matches),
         times_(times),
         rays_(camera),
-        camera_(camera.camera()),
-        to_(to),
-        light_(light),
         options_(options),
-        lateness_(points, times, light, stereo) {}
+        center_(camera.camera().center()),
+        rig_from_cam_(camera.camera().cam_from_rig.rotation.transpose()),
+        light_(light, center_),
+        lateness_(points, times, light_, stereo) {}
 
-  void put(PointMap& points, int x, int y, Neighbourhood& around, FusionCounts& counts) const {
-    const bool matched = points.status(x, y) == PixelStatus::ok;
-    if (times_.status(x, y) != PixelStatus::ok || !(matched || may_be_sectioned(points.status(x, y)))) return;
-    const Eigen::Vector3d direction = rig_from_cam_ * rays_.direction(x, y).homogeneous();
-    const Ray ray{center_, direction.normalized()};
-    const double late = lateness_.at(x, y);
-    if (!std::isfinite(late)) return;
-    const LightSection met = section(light_, ray, times_.time(x, y) - late);
-    if (!(met.distance_mm > 0 && std::isfinite(met.distance_mm))) return;
-    const Estimate sheet{met.distance_mm, std::pow(times_.sigma(x, y) * met.mm_per_frame, 2)};
-    const double depth = sheet.distance_mm / direction.norm();
-    // Where the sheet alone decides, it must know the distance better than half of what a pixel sees.
-    const bool knows = sheet.variance_mm2 < std::pow(0.5 * depth / camera_.fx, 2);
-    const auto decides = [&] { return knows && is_inside_a_surface(x, y, around); };
-    if (matched) return fuse(points, x, y, ray, met, sheet, decides, counts);
-    if (!decides() || depth < options_.near_mm || (options_.far_mm > 0 && depth > options_.far_mm)) return;
-    ++counts.added;
-    set(points, x, y, ray, sheet);
+  void put_row(PointMap& points, int y, const PixelSet* only, PlaneFitter& around, FusionCounts& counts) const {
+    std::array<Estimate, PlaneBatch::most> sheets;
+    std::size_t asked = 0;
+    const auto is_asked = [&](int x) {
+      const auto sheet = takes_part(only, x, y) ? put(points, x, y, counts) : std::nullopt;
+      if (sheet) sheets[asked++] = *sheet;
+      return sheet.has_value();
+    };
+    in_batches(rays_.width(), y, is_asked, [&](PlaneBatch& planes) {
+      around.fit(times_.time, planes);
+      const auto inside = around.are_one_surface(times_.sigma, planes);
+      for (std::size_t k = 0; k < planes.count; ++k) decide(points, planes.column[k], y, inside[k], sheets[k], counts);
+      asked = 0;
+    });
   }
 
  private:
-  /// At a step in depth a pixel's time may be that of neither surface.
-  bool is_inside_a_surface(int x, int y, Neighbourhood& around) const {
-    constexpr int radius = 2;
-    around.gather(times_.time, x, y, radius);
-    const auto plane = around.fit_robustly();
-    return plane && is_one_surface(*plane, times_.time, times_.sigma, x, y, radius);
+  Eigen::Vector3d direction_of(int x, int y) const { return rig_from_cam_ * rays_.direction(x, y).homogeneous(); }
+
+  /// \return what the sheet says if it alone decides, should the pixel lie inside a surface
+  std::optional<Estimate> put(PointMap& points, int x, int y, FusionCounts& counts) const {
+    const bool matched = points.status(x, y) == PixelStatus::ok;
+    if (times_.status(x, y) != PixelStatus::ok || !(matched || may_be_sectioned(points.status(x, y))))
+      return std::nullopt;
+    const double late = lateness_.at(x, y);
+    if (!std::isfinite(late)) return std::nullopt;
+    const Eigen::Vector3d direction = direction_of(x, y);
+    const double length = direction.norm();
+    const Ray ray{center_, direction / length};
+    const LightSection met = light_.section(ray.direction, times_.time(x, y) - late);
+    if (!(met.distance_mm > 0 && std::isfinite(met.distance_mm))) return std::nullopt;
+    const double sigma_mm = times_.sigma(x, y) * met.mm_per_frame;
+    const Estimate sheet{met.distance_mm, sigma_mm * sigma_mm};
+    if (matched && fuse(points, x, y, ray, met, sheet, counts)) return std::nullopt;
+    const double depth = sheet.distance_mm / length, half_pixel_mm = 0.5 * depth / rays_.camera().fx;
+    // Where the sheet alone decides, it must know the distance better than half of what a pixel sees.
+    if (sheet.variance_mm2 < half_pixel_mm * half_pixel_mm && (matched || is_allowed(depth))) return sheet;
+    if (matched) reject(points, x, y);
+    return std::nullopt;
   }
 
-  template <class Decides>
-  void fuse(PointMap& points, int x, int y, const Ray& ray, const LightSection& met, const Estimate& sheet,
-            const Decides& sheet_decides, FusionCounts& counts) const {
-    const Eigen::Vector3d point(points.x(x, y), points.y(x, y), points.z(x, y));
-    const Estimate stereo{(point - ray.origin).dot(ray.direction), std::pow(points.sigma(x, y), 2)};
-    // The pixel's time being late by e moves the stereo point by e / (d time_2 / d distance), the other by its speed e.
-    const double pixels_per_mm = (to_.project_jacobian(point) * ray.direction).norm();
-    const double stereo_mm_per_frame = -1 / (matches_.slope(x, y) * pixels_per_mm);
-    const double covariance = std::pow(times_.sigma(x, y), 2) * met.mm_per_frame * stereo_mm_per_frame;
-    const double difference_variance = stereo.variance_mm2 + sheet.variance_mm2 - 2 * covariance;
-    if (!(difference_variance > 0)) return;
-    if (std::abs(sheet.distance_mm - stereo.distance_mm) > 6 * std::sqrt(difference_variance)) {
-      if (!sheet_decides()) return reject(points, x, y);
-      ++counts.corrected;
-      return set(points, x, y, ray, sheet);
+  bool is_allowed(double depth) const {
+    return !(depth < options_.near_mm || (options_.far_mm > 0 && depth > options_.far_mm));
+  }
+
+  /// At a step in depth a pixel's time may be that of neither surface.
+  void decide(PointMap& points, int x, int y, bool is_inside_a_surface, const Estimate& sheet,
+              FusionCounts& counts) const {
+    const bool matched = points.status(x, y) == PixelStatus::ok;
+    if (!is_inside_a_surface) {
+      if (matched) reject(points, x, y);
+      return;
     }
+    ++(matched ? counts.corrected : counts.added);
+    set(points, x, y, {center_, direction_of(x, y).normalized()}, sheet);
+  }
+
+  /// \return whether it is settled; if not, the sheet contradicts the match
+  bool fuse(PointMap& points, int x, int y, const Ray& ray, const LightSection& met, const Estimate& sheet,
+            FusionCounts& counts) const {
+    const Eigen::Vector3d point(points.x(x, y), points.y(x, y), points.z(x, y));
+    const double sigma = points.sigma(x, y);
+    const Estimate stereo{(point - ray.origin).dot(ray.direction), sigma * sigma};
+    // The pixel's time being late by e moves the stereo point by e / (d time_2 / d distance), the other by its speed e.
+    // What the match moves by along its curve moves the point as much as both sigmas tell.
+    const double stereo_mm_per_frame = -sigma / (static_cast<double>(matches_.slope(x, y)) * matches_.sigma(x, y));
+    const double time_sigma = times_.sigma(x, y);
+    const double covariance = time_sigma * time_sigma * met.mm_per_frame * stereo_mm_per_frame;
+    const double difference_variance = stereo.variance_mm2 + sheet.variance_mm2 - 2 * covariance;
+    if (!(difference_variance > 0)) return true;
+    const double difference = sheet.distance_mm - stereo.distance_mm;
+    if (difference * difference > 36 * difference_variance) return false;
     ++counts.weighted;
     set(points, x, y, ray, weigh(stereo, sheet, covariance));
+    return true;
   }
 
   static void reject(PointMap& points, int x, int y) {
@@ -214,13 +244,11 @@ class Fusion {
   const Correspondences& matches_;
   const TimeMap& times_;
   const RayTable& rays_;
-  const Camera& camera_;
-  const Camera& to_;
-  const Light& light_;
   const TriangulationOptions& options_;
+  const Eigen::Vector3d center_;
+  const Eigen::Matrix3d rig_from_cam_;
+  const SeenLight light_;
   const Lateness lateness_;
-  const Eigen::Vector3d center_ = camera_.center();
-  const Eigen::Matrix3d rig_from_cam_ = camera_.cam_from_rig.rotation.transpose();
 };
 
 }  // namespace
@@ -233,18 +261,18 @@ FusionCounts& FusionCounts::operator+=(const FusionCounts& more) {
 }
 
 FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
-                        const RayTable& to, const Light& light, const TriangulationOptions& options,
-                        const PixelSet* only, const PixelSet* stereo) {
+                        const Light& light, const TriangulationOptions& options, const PixelSet* only,
+                        const PixelSet* stereo) {
   const auto fits = [&](int width, int height) { return width == camera.width() && height == camera.height(); };
   if (!fits(points.width(), points.height()) || !fits(matches.width(), matches.height()) ||
       !fits(times.width(), times.height()))
     throw std::invalid_argument("fuse_light: points, matches or times are not of the camera's size");
-  const Fusion fusion(points, matches, times, camera, to.camera(), light, options, stereo);
+  const Fusion fusion(points, matches, times, camera, light, options, stereo);
   std::vector<FusionCounts> rows(static_cast<std::size_t>(camera.height()));
-  parallel_rows(camera.height(), [&](int y) {
-    Neighbourhood around;
-    for (int x = 0; x < camera.width(); ++x)
-      if (takes_part(only, x, y)) fusion.put(points, x, y, around, rows[static_cast<std::size_t>(y)]);
+  constexpr int rows_at_once = 8, radius = 2;
+  parallel_ranges(camera.height(), rows_at_once, [&](int begin, int end) {
+    PlaneFitter around(radius);
+    for (int y = begin; y < end; ++y) fusion.put_row(points, y, only, around, rows[static_cast<std::size_t>(y)]);
   });
   FusionCounts all;
   for (const FusionCounts& row : rows) all += row;

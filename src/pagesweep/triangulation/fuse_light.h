@@ -30,12 +30,11 @@ struct FusionCounts {
 /// step in depth: the pixel's own time and the sheet replace it, or it becomes off_surface where they know too little.
 /// See docs/derivations/fusion.md. Normals are left to fit_normals().
 /// \param points   of `camera`, from triangulate() with these `matches` and `times`; changed
-/// \param to       the camera that the matches are in
 /// \param only     pixels that it is done for; null: all
 /// \param stereo   points that are as triangulate() left them, those around `only` among them; null: all
 /// \throws std::invalid_argument  if sizes differ
 FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
-                        const RayTable& to, const Light& light, const TriangulationOptions& options = {},
-                        const PixelSet* only = nullptr, const PixelSet* stereo = nullptr);
+                        const Light& light, const TriangulationOptions& options = {}, const PixelSet* only = nullptr,
+                        const PixelSet* stereo = nullptr);
 
 }  // namespace pagesweep

@@ -83,6 +83,7 @@ struct Stereo {
     points[c].y(x, y) = moved.y();
     points[c].z(x, y) = moved.z();
     points[c].sigma(x, y) = static_cast<float>(std::sqrt(2.0) * time_sigma / std::abs(frames_per_mm));
+    matches[c].sigma(x, y) = static_cast<float>(points[c].sigma(x, y) * pixels_per_mm);
   }
 };
 
@@ -133,8 +134,8 @@ TEST(CalibrateLight, SaysSoWhereThereIsTooLittle) {
 TEST(FuseLight, PointsGetBetterAndKnowByHowMuch) {
   Stereo stereo;
   const Errors before = compare(stereo.points[0], stereo.truth[0]);
-  const FusionCounts counts = fuse_light(stereo.points[0], stereo.matches[0], stereo.times[0], stereo.rig.cameras[0],
-                                         stereo.rig.cameras[1], stereo.light);
+  const FusionCounts counts =
+      fuse_light(stereo.points[0], stereo.matches[0], stereo.times[0], stereo.rig.cameras[0], stereo.light);
   const Errors after = compare(stereo.points[0], stereo.truth[0]);
   EXPECT_GT(counts.weighted, 10000);
   EXPECT_NEAR(before.normalised, 1, 0.05);
@@ -146,8 +147,8 @@ TEST(FuseLight, WhatOneCameraSeesIsMeasured) {
   Stereo stereo;
   for (int y = 60; y < 100; ++y)
     for (int x = 60; x < 80; ++x) stereo.points[0].status(x, y) = PixelStatus::no_match;
-  const FusionCounts counts = fuse_light(stereo.points[0], stereo.matches[0], stereo.times[0], stereo.rig.cameras[0],
-                                         stereo.rig.cameras[1], stereo.light);
+  const FusionCounts counts =
+      fuse_light(stereo.points[0], stereo.matches[0], stereo.times[0], stereo.rig.cameras[0], stereo.light);
   EXPECT_GE(counts.added, 700);
   for (int y = 60; y < 100; ++y)
     for (int x = 60; x < 80; ++x) {
@@ -163,8 +164,7 @@ TEST(FuseLight, AWrongMatchIsOverruledAndLightThatDelaysBothCamerasIsNot) {
   // A facing page delays the times of a whole region: both cameras' alike, so that the points do not move.
   for (int row = 20; row < 60; ++row)
     for (int column = 20; column < 120; ++column) stereo.times[0].time(column, row) += 0.3f;
-  fuse_light(stereo.points[0], stereo.matches[0], stereo.times[0], stereo.rig.cameras[0], stereo.rig.cameras[1],
-             stereo.light);
+  fuse_light(stereo.points[0], stereo.matches[0], stereo.times[0], stereo.rig.cameras[0], stereo.light);
   EXPECT_NEAR(stereo.points[0].z(x, y), stereo.truth[0].z(x, y), 6 * stereo.points[0].sigma(x, y));
   for (int row = 32; row < 48; ++row)
     for (int column = 32; column < 108; ++column) {
@@ -177,7 +177,7 @@ TEST(FuseLight, AWrongMatchIsOverruledAndLightThatDelaysBothCamerasIsNot) {
 TEST(FuseLight, RefusesOtherSizes) {
   const Rig rig = sim::make_test_rig(64);
   PointMap points(64, 64);
-  EXPECT_THROW(fuse_light(points, Correspondences(64, 64), TimeMap(63, 64), rig.cameras[0], rig.cameras[1], *rig.light),
+  EXPECT_THROW(fuse_light(points, Correspondences(64, 64), TimeMap(63, 64), rig.cameras[0], *rig.light),
                std::invalid_argument);
 }
 

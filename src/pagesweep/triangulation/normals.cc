@@ -14,6 +14,8 @@
 namespace pagesweep {
 namespace {
 
+constexpr int rows_at_once = 8;
+
 /// The normal of a plane seen around pixel (x, y), in the camera's frame and towards it.
 /// \param plane  its inverse depth, over that of the pixel's own point, less 1
 Eigen::Vector3f normal_of(const LocalPlane& plane, const RayTable& rays, int x, int y) {
@@ -58,30 +60,30 @@ void reject(PointMap& points, int x, int y) {
 void fit_normals(PointMap& points, const RayTable& camera, int radius_px, const PixelSet* only) {
   const Image<float> inverse_depth = inverse_depths(points, camera.camera(), only, radius_px);
   const Eigen::Matrix3f rig_from_cam = camera.camera().cam_from_rig.rotation.transpose().cast<float>();
-  parallel_rows(points.height(), [&](int y) {
-    Neighbourhood around;
-    for (int x = 0; x < points.width(); ++x) {
-      if (points.status(x, y) != PixelStatus::ok || !takes_part(only, x, y)) continue;
-      around.gather(inverse_depth, x, y, radius_px);
-      auto plane = around.fit();
-      if (!plane) {
-        if (around.size() < 7) reject(points, x, y);
-        continue;
-      }
-      const auto [median, has_outliers] = around.median_miss(*plane);
-      if (has_outliers) plane = around.fit(*plane, 3 * median);
-      if (!plane) continue;
-      const float here = inverse_depth(x, y);
-      const float sigma = points.sigma(x, y) * here * here;  // of an inverse depth
-      if (std::abs(plane->middle) > 6 * std::max(sigma, median)) {
-        reject(points, x, y);
-        continue;
-      }
-      const LocalPlane relative{plane->across / here, plane->down / here, plane->middle / here};
-      const Eigen::Vector3f normal = rig_from_cam * normal_of(relative, camera, x, y);
-      points.nx(x, y) = normal.x();
-      points.ny(x, y) = normal.y();
-      points.nz(x, y) = normal.z();
+  const auto put = [&](const PlaneBatch& planes, std::size_t k) {
+    const int x = planes.column[k], y = planes.row;
+    if (!planes.found(k)) {
+      if (planes.size[k] < 7) reject(points, x, y);
+      return;
+    }
+    const LocalPlane plane = planes.plane(k);
+    const float here = inverse_depth(x, y);
+    const float sigma = points.sigma(x, y) * here * here;  // of an inverse depth
+    if (std::abs(plane.middle) > 6 * std::max(sigma, planes.median[k])) return reject(points, x, y);
+    const LocalPlane relative{plane.across / here, plane.down / here, plane.middle / here};
+    const Eigen::Vector3f normal = rig_from_cam * normal_of(relative, camera, x, y);
+    points.nx(x, y) = normal.x();
+    points.ny(x, y) = normal.y();
+    points.nz(x, y) = normal.z();
+  };
+  parallel_ranges(points.height(), rows_at_once, [&](int begin, int end) {
+    PlaneFitter fitter(radius_px);
+    for (int y = begin; y < end; ++y) {
+      const auto is_wanted = [&](int x) { return points.status(x, y) == PixelStatus::ok && takes_part(only, x, y); };
+      in_batches(points.width(), y, is_wanted, [&](PlaneBatch& planes) {
+        fitter.fit(inverse_depth, planes);
+        for (std::size_t k = 0; k < planes.count; ++k) put(planes, k);
+      });
     }
   });
 }
