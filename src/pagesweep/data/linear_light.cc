@@ -27,9 +27,13 @@ Image<float> linear_light(const Picture& picture) {
         for (int i = 0; i <= highest; ++i)
           table[static_cast<std::size_t>(i)] =
               light_of(static_cast<double>(i) / highest) / static_cast<float>(picture.channels);
-        parallel_rows(picture.height(), [&](int y) {
-          for (int x = 0; x < picture.width(); ++x)
-            for (int c = 0; c < picture.channels; ++c) light(x, y) += table[samples(x * picture.channels + c, y)];
+        parallel_rows(light.height(), [&](int y) {
+          const auto* sample = samples.row(y).data();
+          for (float& pixel : light.row(y)) {
+            float sum = 0;
+            for (int c = 0; c < picture.channels; ++c) sum += table[*sample++];
+            pixel = sum;
+          }
         });
       },
       picture.samples);

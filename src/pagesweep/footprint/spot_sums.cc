@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
 #include "pagesweep/footprint/spot_sums_internal.h"
 
 // Not worth their time to compile beside SSE4, AVX2 and AVX-512.
@@ -42,16 +45,19 @@ class Sums {
 
   void add(const LightArray& corner, const GaussianSpot& spot, const Cell& cell) {
     alignas(64) static constexpr float ahead[spot_padding] = {0, 1, 2, 3, 4, 5, 6, 7};
-    for (int row = 0; row < spot.rows; row += spot.row_step) {
-      const float j = static_cast<float>(row) + cell.down - spot.v;
-      const Vector jj = set(spot.vv * j * j), two_j = set(2 * spot.uv * j);
-      for (int column = 0; column < spot.columns; column += lanes) {
-        const Vector i = hn::Add(hn::Load(Floats(), ahead), set(static_cast<float>(column) + cell.right - spot.u));
-        const Vector square = hn::MulAdd(i, hn::MulAdd(i, set(spot.uu), two_j), jj);
-        const Vector weight = hn::Exp(Floats(), hn::Mul(set(-0.5f), square));
+    const auto step = static_cast<float>(spot.row_step);
+    const bool by_ratio = spot.weighs_everywhere();
+    const Vector shrinks = hn::Exp(Floats(), set(-spot.vv * step * step));
+    for (int column = 0; column < spot.columns; column += lanes) {
+      const Vector i = hn::Add(hn::Load(Floats(), ahead), set(static_cast<float>(column) + cell.right - spot.u));
+      const float first = cell.down - spot.v;
+      Weights weights{weight_of(square_at(spot, i, first)), shrinks, shrinks};
+      if (by_ratio) weights.ratio = weight_of(hn::Sub(square_at(spot, i, first + step), square_at(spot, i, first)));
+      for (int row = 0; row < spot.rows; row += spot.row_step) {
+        const float j = first + static_cast<float>(row);
+        const Vector square = square_at(spot, i, j), weight = by_ratio ? weights.next() : weight_of(square);
         const Vector light = cell.at(corner.first + row * corner.stride + column, corner.stride);
-        const auto counts = hn::Le(square, set(spot.most));
-        const Vector weighed = hn::IfThenElseZero(counts, hn::Mul(weight, light));
+        const Vector weighed = hn::IfThenElseZero(hn::Le(square, set(spot.most)), hn::Mul(weight, light));
         light_ = hn::Add(light_, weighed);
         u_ = hn::MulAdd(weighed, i, u_);
         v_ = hn::MulAdd(weighed, set(j), v_);
@@ -65,6 +71,21 @@ class Sums {
   }
 
  private:
+  /// Down a column, each weight is the one above times a ratio that itself shrinks evenly.
+  struct Weights {
+    Vector weight, ratio, shrinks;
+    HWY_INLINE Vector next() {
+      const Vector here = weight;
+      weight = hn::Mul(weight, ratio);
+      ratio = hn::Mul(ratio, shrinks);
+      return here;
+    }
+  };
+  static HWY_INLINE Vector square_at(const GaussianSpot& spot, Vector i, float j) {
+    return hn::MulAdd(i, hn::MulAdd(i, set(spot.uu), set(2 * spot.uv * j)), set(spot.vv * j * j));
+  }
+  static HWY_INLINE Vector weight_of(Vector square) { return hn::Exp(Floats(), hn::Mul(set(-0.5f), square)); }
+
   Vector light_, u_, v_;
 };
 
@@ -85,6 +106,13 @@ HWY_AFTER_NAMESPACE();
 namespace pagesweep {
 
 HWY_EXPORT(SumSpot);
+
+bool GaussianSpot::weighs_everywhere() const {
+  const auto across = std::max(u, static_cast<float>(columns + spot_padding) - u);
+  const auto down = std::max(v, static_cast<float>(rows + row_step) - v);
+  constexpr float far = 100;  // what weighs exp(-far / 2) is still a normal number
+  return uu * across * across + 2 * std::abs(uv) * across * down + vv * down * down < far;
+}
 
 SpotSums sum_spot(const LightArray& corner, const GaussianSpot& spot) {
   return HWY_DYNAMIC_DISPATCH(SumSpot)(corner, spot);

@@ -21,6 +21,9 @@ struct GaussianSpot {
   int columns, rows;  ///< [px] of the square; one more of each is read
   int parts;          ///< places are 1 / parts px apart where the spot is smaller than a pixel,
   int row_step;       ///< and in every row_step-th row only, where it is much larger
+
+  /// Whether weights all over the square are numbers that can be multiplied.
+  bool weighs_everywhere() const;
 };
 
 /// Sums over places: of the spot's weight times the light, and of that times the place's distance from the middle [px].

@@ -63,6 +63,12 @@ TEST_F(SpotSumsTest, OfASmallSpotLookBetweenThePixels) {
   expect_plain_sums(50, 30, {3.2f, 2.6f, 3.1f, -1.2f, 4.3f, 9.01f, 8, 6, 3, 1});
 }
 
+TEST_F(SpotSumsTest, OfANarrowSpotThatLiesAskewAreNoDifferent) {
+  const GaussianSpot spot{20.3f, 18.9f, 0.5f, -0.48f, 0.5f, 9.01f, 42, 38, 1, 1};
+  ASSERT_FALSE(spot.weighs_everywhere());
+  expect_plain_sums(1, 0, spot);
+}
+
 TEST_F(SpotSumsTest, OfALargeSpotLeaveRowsOut) {
   expect_plain_sums(1, 0, {25.4f, 19.7f, 0.015f, 0.002f, 0.025f, 9.01f, 52, 38, 1, 4});
 }

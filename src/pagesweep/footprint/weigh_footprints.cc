@@ -12,7 +12,6 @@
 
 #include "pagesweep/base/local_plane.h"
 #include "pagesweep/base/parallel.h"
-#include "pagesweep/data/linear_light.h"
 #include "pagesweep/footprint/spot_sums_internal.h"
 
 namespace pagesweep {
@@ -162,12 +161,11 @@ Eigen::Vector2f middle_of(float variance, const ScanPatch& patch, const Image<fl
 
 }  // namespace
 
-SpotOffsets weigh_footprints(const PointMap& points, const Scanner& scanner, const Picture& scan,
+SpotOffsets weigh_footprints(const PointMap& points, const Scanner& scanner, const Image<float>& light,
                              double spot_variance_px2) {
-  if (scan.width() != scanner.width() || scan.height() != scanner.height())
-    throw std::invalid_argument("weigh_footprints: the picture is not of the scanner's size");
+  if (light.width() != scanner.width() || light.height() != scanner.height())
+    throw std::invalid_argument("weigh_footprints: the light is not of the scanner's size");
   if (!(spot_variance_px2 > 0)) throw std::invalid_argument("weigh_footprints: the spot's variance must be above 0");
-  const Image<float> light = linear_light(scan);
   const ScanPositions positions = project(points, scanner);
   const auto sigma_px = static_cast<float>(std::sqrt(spot_variance_px2));
   const float usual_px = 3 * sigma_px * typical_step(positions);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/data/linear_light.h"
 #include "pagesweep/footprint/weigh_footprints.h"
 #include "pagesweep/sim/analytic_scene.h"
 
@@ -65,7 +66,7 @@ void weigh(benchmark::State& state) {
   const PointMap points = page.points(rig.cameras[0]);
   const Picture scan = print(*rig.scanner, 0.01 * static_cast<double>(state.range(0)));
   SpotOffsets offsets;
-  for (auto _ : state) offsets = weigh_footprints(points, *rig.scanner, scan, spot_variance_px2);
+  for (auto _ : state) offsets = weigh_footprints(points, *rig.scanner, linear_light(scan), spot_variance_px2);
   double squares = 0, count = 0, moved = 0, known = 0;
   for (int y = 11; y + 11 < points.height(); ++y)
     for (int x = 11; x + 11 < points.width(); ++x) {

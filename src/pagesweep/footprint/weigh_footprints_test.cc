@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "pagesweep/data/linear_light.h"
 #include "pagesweep/sim/analytic_scene.h"
 
 namespace pagesweep {
@@ -28,7 +29,7 @@ TEST(WeighFootprints, AtASharpEdgeTheMiddleIsThatOfAHalfGaussian) {
   const sim::AnalyticScene sheet{[](double, double) { return 10.0; }};
   const PointMap points = sheet.points(rig().cameras[0]);
   const double edge = 0.5 * rig().scanner->width(), variance = 0.4;
-  const SpotOffsets offsets = weigh_footprints(points, *rig().scanner, half_black(edge), variance);
+  const SpotOffsets offsets = weigh_footprints(points, *rig().scanner, linear_light(half_black(edge)), variance);
   // E[x | x > c] of a Gaussian is its density at c over what lies beyond.
   const double sigma = std::sqrt(variance);
   int near = 0;
@@ -53,7 +54,7 @@ TEST(WeighFootprints, AtASharpEdgeTheMiddleIsThatOfAHalfGaussian) {
 TEST(WeighFootprints, BlankPaperIsSeenWhereThePixelLooks) {
   const sim::AnalyticScene sheet{[](double x, double) { return 20 + 10 * std::cos(x / 40); }};
   const PointMap points = sheet.points(rig().cameras[0]);
-  const SpotOffsets offsets = weigh_footprints(points, *rig().scanner, half_black(0), 0.4);
+  const SpotOffsets offsets = weigh_footprints(points, *rig().scanner, linear_light(half_black(0)), 0.4);
   int count = 0;
   for (const float dx : offsets.dx.pixels())
     if (std::isfinite(dx)) {
@@ -65,10 +66,10 @@ TEST(WeighFootprints, BlankPaperIsSeenWhereThePixelLooks) {
 
 TEST(WeighFootprints, KnowsNothingWhereNoPointIs) {
   PointMap points(96, 96);
-  const SpotOffsets offsets = weigh_footprints(points, *rig().scanner, half_black(100), 0.4);
+  const SpotOffsets offsets = weigh_footprints(points, *rig().scanner, linear_light(half_black(100)), 0.4);
   for (const float dx : offsets.dx.pixels()) EXPECT_TRUE(std::isnan(dx));
-  EXPECT_THROW(weigh_footprints(points, *rig().scanner, make_picture(10, 10, 1, 8), 0.4), std::invalid_argument);
-  EXPECT_THROW(weigh_footprints(points, *rig().scanner, half_black(100), 0), std::invalid_argument);
+  EXPECT_THROW(weigh_footprints(points, *rig().scanner, Image<float>(10, 10), 0.4), std::invalid_argument);
+  EXPECT_THROW(weigh_footprints(points, *rig().scanner, linear_light(half_black(100)), 0), std::invalid_argument);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/camera/ray_table.h"
+#include "pagesweep/data/linear_light.h"
 #include "pagesweep/footprint/weigh_footprints.h"
 #include "pagesweep/matching/match_sequences.h"
 #include "pagesweep/pipeline/point_stream.h"
@@ -139,10 +140,11 @@ void correct_by_amplitude(const std::vector<TimeMap>& seen, Measurement& measure
 /// better: a scan that does not lie where the rig says is no witness.
 void correct_by_scan(const std::vector<TimeMap>& seen, const Scanner& scanner, const Picture& scan,
                      Measurement& measurement) {
+  const Image<float> light = linear_light(scan);
   for (std::size_t c = 0; c < seen.size(); ++c) {
     const double spot_variance_px2 = measurement.edges[c].gain;
     if (!(spot_variance_px2 > 0)) continue;
-    const SpotOffsets offsets = weigh_footprints(measurement.points[c], scanner, scan, spot_variance_px2);
+    const SpotOffsets offsets = weigh_footprints(measurement.points[c], scanner, light, spot_variance_px2);
     const auto comparisons = compare_with_surroundings(seen[c], offsets);
     const EdgeCorrection correction = fit_edges(seen[c], comparisons);
     if (!(correction.after < measurement.edges[c].after)) continue;
