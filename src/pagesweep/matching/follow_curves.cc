@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 
 // Not worth their time to compile beside SSE4, AVX2 and AVX-512.
@@ -45,6 +46,7 @@ class Curves {
     Vector u, v;  ///< [px]
     hn::Vec<Integers> cell;
     Vector right, down;  ///< [px] from the cell's first pixel
+    Mask imaged;         ///< by the lens, be it inside the picture or not
     Mask seen;
   };
 
@@ -62,8 +64,8 @@ class Curves {
     place.v = hn::MulAdd(set(lens.fy), hn::MulAdd(y, radial, tangent_y), set(lens.cy));
     const auto width = static_cast<float>(batch_.times.width), height = static_cast<float>(batch_.times.height);
     const auto inside = [](Vector p, float end) { return hn::And(hn::Ge(p, set(-0.5f)), hn::Le(p, set(end - 0.5f))); };
-    place.seen = hn::And(hn::And(inside(place.u, width), inside(place.v, height)),
-                         hn::And(hn::Gt(z, set(0)), hn::Le(rr, set(lens.max_radius_squared))));
+    place.imaged = hn::And(hn::Gt(z, set(0)), hn::Le(rr, set(lens.max_radius_squared)));
+    place.seen = hn::And(hn::And(inside(place.u, width), inside(place.v, height)), place.imaged);
     // A place in the outer half pixel takes the outermost cell, and no less than its border.
     const Vector column = hn::Min(hn::Max(hn::IfThenElseZero(place.seen, place.u), set(0)), set(width - 1));
     const Vector row = hn::Min(hn::Max(hn::IfThenElseZero(place.seen, place.v), set(0)), set(height - 1));
@@ -180,99 +182,105 @@ void FollowCurves(CurveBatch& batch) {
 /// Places on one curve, a stretch of them at a time.
 class CurveSearch {
  public:
-  static constexpr std::size_t stretch = 16, chunk = most_curves;  ///< places, stretches
+  CurveSearch(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,
+              std::size_t count)
+      : curves_(batch, direction, time), times_(batch.times), time_(time), first_(first), step_(step), count_(count) {}
 
-  CurveSearch(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step)
-      : curves_(batch, direction, time), times_(batch.times), time_(time), first_(first), step_(step) {}
-
-  /// Looks closely where the time may be that is looked for, and beside it, and else nowhere.
-  bool operator()(std::span<float> ahead) {
-    bool seen = false, before = false;
-    const std::size_t stretches = (ahead.size() + stretch - 1) / stretch;
-    for (std::size_t i = 0; i < stretches; i += chunk) {
-      // One stretch before and one behind, whose neighbours must be known.
-      look_over(i);
-      seen = seen || any_seen_;
-      for (std::size_t k = 0; k < chunk && i + k < stretches; ++k) {
-        const bool close = before || promising_[k] || promising_[k + 1];
-        before = promising_[k];
-        const auto part = ahead.subspan((i + k) * stretch, std::min(stretch, ahead.size() - (i + k) * stretch));
-        if (close) {
-          seen = compare((i + k) * stretch, part) || seen;
-        } else {
-          std::ranges::fill(part, std::numeric_limits<float>::quiet_NaN());
-        }
-      }
+  /// Looks closely where the time may be that is looked for, and else nowhere.
+  bool operator()(std::vector<std::size_t>& changes) const {
+    const std::size_t stretches = (count_ + stretch - 1) / stretch, at_once = hn::Lanes(Floats()) - 1;
+    bool seen = false;
+    for (std::size_t i = 0; i < stretches; i += at_once) {
+      const Promise promise = look_over(i);
+      seen = seen || promise.seen;
+      for (std::size_t k = 0; k < at_once && i + k < stretches; ++k)
+        if (promise.stretches >> k & 1u) seen = compare((i + k) * stretch, changes) || seen;
     }
-    return seen;
+    return seen || sees_any();
   }
 
  private:
-  Curves::Place place_at(std::size_t k, float stride) const {
-    const Vector steps = hn::MulAdd(hn::Iota(Floats(), 0), set(stride), set(static_cast<float>(k)));
-    return curves_.at(hn::MulAdd(steps, set(step_), set(first_)));
+  static constexpr std::size_t stretch = most_curves - 1;  ///< steps, so that their places are a vector at the most
+  /// [px] Between the middles of two stretches, at most; a lens makes some steps a little longer than others. So no
+  /// place is farther than a block from its stretch's middle, be the curve a little bent.
+  static constexpr float farthest = 17;
+
+  Curves::Place place_at(Vector k) const {
+    return curves_.at(hn::MulAdd(hn::Min(k, set(static_cast<float>(count_))), set(step_), set(first_)));
   }
 
-  /// Which of the stretches first ... first + chunk may have the time.
-  void look_over(std::size_t first) {
-    constexpr std::size_t ends = chunk + 2, room = ends + most_curves;
-    HWY_ALIGN float u[room], v[room];
-    const Vector unseen = no_number();
-    any_seen_ = false;
-    for (std::size_t k = 0; k < ends; k += hn::Lanes(Floats())) {
-      const auto place = place_at((first + k) * stretch, static_cast<float>(stretch));
-      any_seen_ = any_seen_ || !hn::AllFalse(Floats(), place.seen);
-      hn::StoreU(hn::IfThenElse(place.seen, place.u, unseen), Floats(), u + k);
-      hn::StoreU(hn::IfThenElse(place.seen, place.v, unseen), Floats(), v + k);
-    }
-    for (std::size_t k = 0; k <= chunk; ++k) promising_[k] = may_have_time(u[k], v[k], u[k + 1], v[k + 1]);
+  bool sees_any() const {
+    bool seen = false;
+    for (std::size_t k = 0; k <= count_ && !seen; k += hn::Lanes(Floats()))
+      seen = !hn::AllFalse(Floats(), place_at(hn::Iota(Floats(), static_cast<float>(k))).seen);
+    return seen;
   }
 
-  /// \param u, v  of a stretch's ends; NaN: unseen
-  bool may_have_time(float u0, float v0, float u1, float v1) const {
-    const auto [left, right] = std::minmax(u0, u1);
-    const auto [top, bottom] = std::minmax(v0, v1);
-    if (!(right - left + bottom - top >= 0)) return true;
-    // A pixel for the bending of the curve.
-    const int rows = (times_.height + time_block_px - 1) / time_block_px;
-    const auto block = [](float p, int blocks) {
-      return std::clamp(static_cast<int>(p) / time_block_px, 0, blocks - 1);
+  /// One bit a stretch, and whether any of their middles is seen.
+  struct Promise {
+    unsigned stretches;
+    bool seen;
+  };
+  /// Which of the stretches from `first` on may have the time; of the last lane only the middle is looked at.
+  Promise look_over(std::size_t first) const {
+    const Floats d;
+    constexpr auto length = static_cast<float>(stretch);
+    const Vector index = hn::Add(hn::Iota(d, 0), set(static_cast<float>(first)));
+    const auto place = place_at(hn::MulAdd(index, set(length), set(0.5f * length)));
+    HWY_ALIGN float u[most_curves + 1], v[most_curves + 1];
+    hn::StoreU(place.u, d, u);
+    hn::StoreU(place.v, d, v);
+    u[hn::Lanes(d)] = v[hn::Lanes(d)] = 0;
+    const auto near = [&](const float* p, Vector here) {
+      return hn::Le(hn::Abs(hn::Sub(hn::LoadU(d, p + 1), here)), set(farthest));
     };
-    const int first_column = block(left - 1, times_.blocks), last_column = block(right + 1, times_.blocks);
-    const int first_row = block(top - 1, rows), last_row = block(bottom + 1, rows);
-    constexpr float rounding = 1e-3f;  // [frames]
-    for (int row = first_row; row <= last_row; ++row)
-      for (int column = first_column; column <= last_column; ++column) {
-        const int index = row * times_.blocks + column;
-        if (times_.earliest[index] <= time_ + rounding && times_.latest[index] >= time_ - rounding) return true;
-      }
-    return false;
+    const Mask even = hn::And(hn::And(near(u, place.u), near(v, place.v)), place.imaged);
+    const Mask hopeful = hn::Or(may_have_time(place), hn::Not(even));
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, hopeful, bits);
+    return {static_cast<unsigned>(bits[0] | bits[1] << 8), !hn::AllFalse(d, place.seen)};
   }
 
-  /// \return whether any of these places is seen
-  bool compare(std::size_t first, std::span<float> ahead) const {
+  /// \return where the blocks around a place have times before and after
+  Mask may_have_time(const Curves::Place& place) const {
+    const Integers d;
+    constexpr float share = 1.0f / time_block_px, rounding = 1e-3f;  // [frames]
+    const int rows = (times_.height + time_block_px - 1) / time_block_px;
+    const auto block = [&](Vector p, int blocks) {
+      const Vector inside = hn::Min(hn::Max(hn::Mul(p, set(share)), set(0)), set(static_cast<float>(blocks - 1)));
+      return hn::ConvertTo(d, hn::IfThenElseZero(place.imaged, inside));
+    };
+    const auto index = hn::Add(hn::Mul(block(place.v, rows), hn::Set(d, times_.blocks)), block(place.u, times_.blocks));
+    return hn::And(hn::Le(hn::GatherIndex(Floats(), times_.earliest, index), set(time_ + rounding)),
+                   hn::Ge(hn::GatherIndex(Floats(), times_.latest, index), set(time_ - rounding)));
+  }
+
+  /// \return whether any of the places of a stretch is seen
+  bool compare(std::size_t first, std::vector<std::size_t>& changes) const {
     const Floats d;
     bool seen = false;
-    HWY_ALIGN float differences[stretch + most_curves];
-    for (std::size_t k = 0; k < ahead.size(); k += hn::Lanes(d)) {
-      const auto place = place_at(first + k, 1);
+    HWY_ALIGN float ahead[most_curves];
+    for (std::size_t k = 0; k < most_curves; k += hn::Lanes(d)) {
+      const auto place = place_at(hn::Iota(d, static_cast<float>(first + k)));
       seen = seen || !hn::AllFalse(d, place.seen);
-      hn::StoreU(curves_.ahead(place), d, differences + k);
+      hn::StoreU(curves_.ahead(place), d, ahead + k);
     }
-    std::copy_n(differences, ahead.size(), ahead.begin());
+    const std::size_t steps = std::min(stretch, count_ - first);
+    for (std::size_t k = 0; k < steps; ++k)
+      if (ahead[k] * ahead[k + 1] <= 0) changes.push_back(first + k);
     return seen;
   }
 
   Curves curves_;
   const TimeArrays& times_;
   float time_, first_, step_;
-  bool any_seen_ = false;
-  std::array<bool, chunk + 1> promising_{};
+  std::size_t count_;
 };
 
 bool SearchCurve(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,
-                 std::span<float> ahead) {
-  return CurveSearch(batch, direction, time, first, step)(ahead);
+                 std::size_t count, std::vector<std::size_t>& changes) {
+  changes.clear();
+  return CurveSearch(batch, direction, time, first, step, count)(changes);
 }
 
 }  // namespace pagesweep::HWY_NAMESPACE
@@ -287,8 +295,8 @@ HWY_EXPORT(SearchCurve);
 void follow_curves(CurveBatch& batch) { HWY_DYNAMIC_DISPATCH(FollowCurves)(batch); }
 
 bool search_curve(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,
-                  std::span<float> ahead) {
-  return HWY_DYNAMIC_DISPATCH(SearchCurve)(batch, direction, time, first, step, ahead);
+                  std::size_t count, std::vector<std::size_t>& changes) {
+  return HWY_DYNAMIC_DISPATCH(SearchCurve)(batch, direction, time, first, step, count, changes);
 }
 
 }  // namespace pagesweep

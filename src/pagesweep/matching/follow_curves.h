@@ -2,7 +2,8 @@
 #pragma once
 
 #include <array>
-#include <span>
+#include <cstddef>
+#include <vector>
 
 #include "pagesweep/camera/camera.h"
 
@@ -10,9 +11,7 @@ namespace pagesweep {
 
 inline constexpr int most_curves = 16;  ///< followed at once; the longest vector
 
-/// Side of the squares of pixels whose times are bounded together, with the pixels right of and below them: all that a
-/// time is interpolated from.
-inline constexpr int time_block_px = 16;
+inline constexpr int time_block_px = 10;  ///< side of the squares of pixels whose times are bounded together
 
 /// A time map to be asked between its pixels, as arrays. Rows follow each other without gaps.
 struct TimeArrays {
@@ -21,8 +20,9 @@ struct TimeArrays {
   const float* amplitude;  ///< [gray values]
   const float* between;    ///< 0 where times may be interpolated between (x, y) and (x + 1, y + 1), NaN where not
   int width, height;       ///< [px] at least 2
-  const float* earliest;   ///< [frames] of a block's pixels; no less than any number where it has none
-  const float* latest;     ///< [frames] likewise, no more than any number
+  const float* earliest;   ///< [frames] of the pixels of a block, of those around it and of the row and column behind
+                           ///< these: all that times up to a block away are interpolated from; infinity: none
+  const float* latest;     ///< [frames] likewise; -infinity: none
   int blocks;              ///< in a row of the picture
 };
 
@@ -60,12 +60,13 @@ struct CurveBatch {
 /// pixels and steps, or lies beside a gap or the border, or is not as bright as the pixel, is left to a closer look.
 void follow_curves(CurveBatch& batch);
 
-/// How far the other camera's time is ahead of `time` at the inverse depths first + k step of one curve; NaN where it
-/// has no time or does not see, and far from where the times are equal. Of the batch, only what is the same for all
-/// pixels is read.
+/// Between which of the inverse depths first + k step of one curve, k = 0 ... count, the other camera's time may become
+/// equal to `time`: k where its sign of being ahead changes between k and k + 1, or it is equal at either. Of the
+/// batch, only what is the same for all pixels is read.
+/// \param step  [1/mm] about a pixel or less
 /// \param direction  of the pixel, in the other camera's frame
 /// \return whether the other camera sees any of these places
 bool search_curve(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,
-                  std::span<float> ahead);
+                  std::size_t count, std::vector<std::size_t>& changes);
 
 }  // namespace pagesweep

@@ -71,6 +71,8 @@ TimeField::TimeField(int width, int height)
     : linked_(width, height),
       earliest_(blocks_over(width), blocks_over(height), infinity),
       latest_(blocks_over(width), blocks_over(height), -infinity),
+      earliest_around_(earliest_),
+      latest_around_(latest_),
       between_(width, height, not_a_number) {}
 
 TimeField::TimeField(const TimeMap& map) : TimeField(map.width(), map.height()) { update(map, nullptr); }
@@ -120,11 +122,25 @@ void TimeField::bound_blocks(const PixelSet* news) {
       latest_(column, row) = latest;
     }
   });
+  parallel_rows(earliest_.height(), [&](int row) {
+    const int top = std::max(0, row - 1), bottom = std::min(row + 2, earliest_.height());
+    for (int column = 0; column < earliest_.width(); ++column) {
+      const int left = std::max(0, column - 1), right = std::min(column + 2, earliest_.width());
+      float earliest = infinity, latest = -infinity;
+      for (int y = top; y < bottom; ++y)
+        for (int x = left; x < right; ++x) {
+          earliest = std::min(earliest, earliest_(x, y));
+          latest = std::max(latest, latest_(x, y));
+        }
+      earliest_around_(column, row) = earliest;
+      latest_around_(column, row) = latest;
+    }
+  });
 }
 
 TimeArrays TimeField::arrays() const {
-  return {map_->time.data(), map_->sigma.data(), map_->amplitude.data(), between_.data(),  map_->width(),
-          map_->height(),    earliest_.data(),   latest_.data(),         earliest_.width()};
+  return {map_->time.data(), map_->sigma.data(),      map_->amplitude.data(), between_.data(),  map_->width(),
+          map_->height(),    earliest_around_.data(), latest_around_.data(),  earliest_.width()};
 }
 
 TimeField::Cell TimeField::cell_at(const Eigen::Vector2d& pixel) const {

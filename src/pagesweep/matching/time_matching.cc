@@ -178,7 +178,7 @@ class TimeFinder final : public MatchFinder {
 
   const TimeMap& from_;
   SearchedMap to_;
-  std::vector<float> ahead_;  ///< along a curve, see search_curve()
+  std::vector<std::size_t> changes_;  ///< along a curve, see search_curve()
   std::vector<double> roots_;
   CurveBatch batch_{};
 };
@@ -222,15 +222,13 @@ bool TimeFinder::find_roots(const Wanted& wanted) {
   constexpr double longest_curve = 200000;  // beside the epipole a curve can be endless
   const auto count = static_cast<std::size_t>(std::clamp(std::ceil(pixels), 1.0, longest_curve));
   const double step = (near - far) / static_cast<double>(count);
-  ahead_.resize(count + 1);
   prepare(curve.view(), curve.origin(), curve.range());
   const Eigen::Vector3f direction = curve.direction().cast<float>();
   const bool seen =
       search_curve(batch_, {direction.x(), direction.y(), direction.z()}, static_cast<float>(difference.time),
-                   static_cast<float>(far), static_cast<float>(step), ahead_);
+                   static_cast<float>(far), static_cast<float>(step), count, changes_);
   roots_.clear();
-  for (std::size_t k = 0; k < count; ++k) {
-    if (!(ahead_[k] * ahead_[k + 1] <= 0)) continue;
+  for (const std::size_t k : changes_) {
     const double low = far + static_cast<double>(k) * step, high = std::min(low + step, near);
     const double at_low = difference(low), at_high = difference(high);
     if (!(at_low * at_high <= 0)) continue;
