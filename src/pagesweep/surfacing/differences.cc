@@ -13,6 +13,7 @@ namespace pagesweep {
 namespace {
 
 constexpr double ease_mm = 15;
+constexpr double coarse_cell_mm = 3;
 constexpr double model_noise_mm = 0.02;
 constexpr double least_cover_mm = 0.3;
 constexpr double mixed_cells = 2;  // from the gutter: as far as a cell there, and its pixels' spots, reach over it
@@ -58,13 +59,37 @@ std::vector<std::pair<int, int>> cells_to_ease(const Image<std::uint8_t>& known,
   return cells;
 }
 
+/// Cells of twice the size: known where one of the four is, and of the known ones' mean height.
+std::pair<Image<double>, Image<std::uint8_t>> halve(const Image<double>& dz, const Image<std::uint8_t>& known) {
+  Image<double> half((dz.width() + 1) / 2, (dz.height() + 1) / 2, 0);
+  Image<std::uint8_t> half_known(half.width(), half.height(), 0);
+  Image<double> counts = half;
+  for (int j = 0; j < dz.height(); ++j)
+    for (int i = 0; i < dz.width(); ++i)
+      if (known(i, j)) {
+        half(i / 2, j / 2) += dz(i, j);
+        counts(i / 2, j / 2) += 1;
+        half_known(i / 2, j / 2) = 1;
+      }
+  for (std::size_t k = 0; k < half.size(); ++k) half.data()[k] /= std::max(1.0, counts.data()[k]);
+  return {std::move(half), std::move(half_known)};
+}
+
 /// Fills the cells around the measured ones with the solution of a screened membrane, laplace(dz) = dz / ease^2, that
-/// hangs from them: it goes on smoothly and eases to 0.
+/// hangs from them: it goes on smoothly and eases to 0. Larger cells, where heights spread in few steps, give the
+/// start.
 void ease_out(Image<double>& dz, const Image<std::uint8_t>& known, double cell_mm) {
   const double screen = 4 + std::pow(cell_mm / ease_mm, 2);
   const double relaxation = 1.7;
   const auto cells = cells_to_ease(known, cell_mm);
-  for (int sweep = 0; sweep < 60; ++sweep)
+  int sweeps = 60;
+  if (cell_mm < coarse_cell_mm) {
+    auto [half, half_known] = halve(dz, known);
+    ease_out(half, half_known, 2 * cell_mm);
+    for (const auto& [i, j] : cells) dz(i, j) = interpolate_nodes(half, 0.5 * i - 0.25, 0.5 * j - 0.25);
+    sweeps = 6;
+  }
+  for (int sweep = 0; sweep < sweeps; ++sweep)
     for (const auto& [i, j] : cells) {
       const double sum = (i > 0 ? dz(i - 1, j) : 0) + (i + 1 < dz.width() ? dz(i + 1, j) : 0) +
                          (j > 0 ? dz(i, j - 1) : 0) + (j + 1 < dz.height() ? dz(i, j + 1) : 0);

@@ -274,17 +274,23 @@ void fit_all_cells(HeightField& field, double radius_mm) {
 void tell_reasons(std::span<const PointMap> cameras, HeightField& field) {
   constexpr std::size_t reasons = names_of(PixelStatus{}).size();
   constexpr int widest_gap_px = 256;
-  Image<std::array<std::uint16_t, reasons>> votes(field.columns(), field.rows());
+  struct Vote {
+    std::size_t cell;
+    PixelStatus reason;
+  };
   const Eigen::Matrix3d plan_from_rig =
       Eigen::AngleAxisd(-field.frame.angle_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  const auto vote = [&](const Eigen::Vector3d& rig, PixelStatus reason) {
-    const Eigen::Vector3d plan = plan_from_rig * rig;
-    const int i = static_cast<int>(std::lround(field.i_of(plan.x())));
-    const int j = static_cast<int>(std::lround(field.j_of(plan.y())));
-    if (votes.contains(i, j)) ++votes(i, j)[static_cast<std::size_t>(reason)];
-  };
-  for (const PointMap& map : cameras)
-    for (int y = 0; y < map.height(); ++y)
+  Image<std::array<std::uint16_t, reasons>> counts(field.columns(), field.rows());
+  for (const PointMap& map : cameras) {
+    std::vector<std::vector<Vote>> of_rows(static_cast<std::size_t>(map.height()));
+    parallel_rows(map.height(), [&](int y) {
+      std::vector<Vote>& votes = of_rows[static_cast<std::size_t>(y)];
+      const auto vote = [&](const Eigen::Vector3d& rig, PixelStatus reason) {
+        const Eigen::Vector3d plan = plan_from_rig * rig;
+        const int i = static_cast<int>(std::lround(field.i_of(plan.x())));
+        const int j = static_cast<int>(std::lround(field.j_of(plan.y())));
+        if (counts.contains(i, j)) votes.push_back({field.index(i, j), reason});
+      };
       for (int x = 0, left = -1; x < map.width(); ++x) {
         if (map.status(x, y) != PixelStatus::ok) continue;
         const auto at = [&](int column) {
@@ -297,9 +303,13 @@ void tell_reasons(std::span<const PointMap> cameras, HeightField& field) {
           }
         left = x;
       }
-  for (std::size_t k = 0; k < votes.size(); ++k) {
+    });
+    for (const auto& votes : of_rows)
+      for (const Vote& vote : votes) ++counts.data()[vote.cell][static_cast<std::size_t>(vote.reason)];
+  }
+  for (std::size_t k = 0; k < counts.size(); ++k) {
     if (field.status.data()[k] != PixelStatus::not_computed) continue;
-    const auto& of_cell = votes.data()[k];
+    const auto& of_cell = counts.data()[k];
     const auto most = std::ranges::max_element(of_cell);
     if (*most > 0) field.status.data()[k] = static_cast<PixelStatus>(most - of_cell.begin());
   }
