@@ -2,11 +2,11 @@
 #include "pagesweep/dewarping/resample.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <numbers>
 
+#include "pagesweep/base/instruction_sets_testing.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/dewarping/printed_page_testing.h"
 
@@ -102,45 +102,27 @@ TEST(Resample, AgreesWithThePlainLoop) {
       }
 }
 
-/// Makes the vector code run with one of the instruction sets that it was built for and this processor has.
-class InstructionSet {
- public:
-  explicit InstructionSet(std::int64_t target) { choose(target); }
-  ~InstructionSet() { choose(0); }  // any
-  InstructionSet(const InstructionSet&) = delete;
-  InstructionSet& operator=(const InstructionSet&) = delete;
-
- private:
-  static void choose(std::int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
-
 TEST(Resample, EveryInstructionSetAgreesWithThePlainLoop) {
   // Odd sizes, odd strides, tiles that end anywhere, and positions beyond all four borders.
   const ScanMap map = make_map(151, 19, -1.2, -0.9, 0.93, 0.03, -0.02, 0.97);
-  for (const auto target : hwy::SupportedAndGeneratedTargets())
+  on_every_instruction_set([&] {
     for (const int channels : {1, 3})
       for (const int bits : {8, 16}) {
         const Picture scan = random_picture(137, 17, channels, bits);
         const Picture plain = resample_plainly(scan, map, 1);
-        const InstructionSet chosen(target);
         // Positions in steps of 1/512 px: half a step times the kernel's steepest slopes, about 1 a pixel along either
         // axis, of noise. 16 bit resolves 256 times more.
         EXPECT_LE(largest_difference(resample(scan, map, 1), plain), bits == 8 ? 2 : 2 * 256)
-            << hwy::TargetName(target) << " " << channels << " " << bits;
+            << channels << " " << bits;
       }
+  });
 }
 
 TEST(Resample, EightBitResultsAreTheSameOnAllProcessors) {
   const Picture scan = random_picture(137, 61, 3, 8);
   const ScanMap map = make_map(97, 53, 3.2, 2.9, 1.03, 0.03, -0.02, 1.01);
   const Picture best = resample(scan, map, 1);
-  for (const auto target : hwy::SupportedAndGeneratedTargets()) {
-    const InstructionSet chosen(target);
-    EXPECT_TRUE(same(resample(scan, map, 1), best)) << hwy::TargetName(target);
-  }
+  on_every_instruction_set([&] { EXPECT_TRUE(same(resample(scan, map, 1), best)); });
 }
 
 TEST(Resample, EightAndSixteenBitGrayAndColourAgreeWithinRounding) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
 #include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "pagesweep/base/image.h"
+#include "pagesweep/base/instruction_sets_testing.h"
 #include "pagesweep/footprint/spot_sums_internal.h"
 
 namespace pagesweep {
@@ -21,7 +21,6 @@ class SpotSumsTest : public testing::Test {
     std::uniform_real_distribution<float> uniform;
     std::ranges::generate(light.pixels(), [&] { return uniform(random); });
   }
-  ~SpotSumsTest() override { hwy::SetSupportedTargetsForTest(0); }
 
   double light_at(double u, double v) const {
     const int x = static_cast<int>(u), y = static_cast<int>(v);
@@ -44,14 +43,12 @@ class SpotSumsTest : public testing::Test {
           sum += weighed, u += weighed * i, v += weighed * j;
         }
     ASSERT_GT(sum, 1);
-    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      SCOPED_TRACE(hwy::TargetName(target));
-      hwy::SetSupportedTargetsForTest(target);
+    on_every_instruction_set([&] {
       const SpotSums sums = sum_spot({&light(left, top), light.width()}, spot);
       EXPECT_NEAR(sums.light, sum, 1e-4 * sum);
       EXPECT_NEAR(sums.u, u, 1e-4 * sum * spot.columns);
       EXPECT_NEAR(sums.v, v, 1e-4 * sum * spot.rows);
-    }
+    });
   }
 };
 

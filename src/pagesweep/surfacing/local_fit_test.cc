@@ -2,11 +2,11 @@
 #include "pagesweep/surfacing/local_fit.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "pagesweep/base/instruction_sets_testing.h"
 #include "pagesweep/surfacing/scenes_for_tests.h"
 #include "pagesweep/surfacing/window_sums.h"
 
@@ -30,9 +30,7 @@ Window random_window(std::size_t size) {
 std::array<double, 6> row_of(const Window& w, std::size_t k) { return {1, w.u[k], w.v[k], w.uu[k], w.uv[k], w.vv[k]}; }
 
 TEST(WindowSums, AgreeWithPlainLoopsOnAllInstructionSets) {
-  for (const auto target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  on_every_instruction_set([&] {
     for (const std::size_t size : {1, 7, 16, 37, 113}) {
       const Window w = random_window(size);
       WindowSums plain;
@@ -47,16 +45,14 @@ TEST(WindowSums, AgreeWithPlainLoopsOnAllInstructionSets) {
       const WindowSums sums = add_up(w);
       // Floats have 24 bits, and so many terms of at most 1 are added up.
       const double rounding = 1e-7 * static_cast<double>(size);
-      for (std::size_t k = 0; k < 21; ++k) EXPECT_NEAR(sums.a[k], plain.a[k], rounding) << hwy::TargetName(target);
-      for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(sums.b[k], plain.b[k], rounding) << hwy::TargetName(target);
+      for (std::size_t k = 0; k < 21; ++k) EXPECT_NEAR(sums.a[k], plain.a[k], rounding);
+      for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(sums.b[k], plain.b[k], rounding);
 
       std::vector<float> sorted(w.residual.begin(), w.residual.begin() + static_cast<std::ptrdiff_t>(size));
       std::ranges::sort(sorted);
-      EXPECT_NEAR(median_residual(w), sorted[size / 2], 5e-3) << hwy::TargetName(target);  // of a mean of 0.5
+      EXPECT_NEAR(median_residual(w), sorted[size / 2], 5e-3);  // of a mean of 0.5
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  });
 }
 
 TEST(WindowSums, GatherTheCellsOfACircleOrOfOneSideOfIt) {
@@ -69,9 +65,7 @@ TEST(WindowSums, GatherTheCellsOfACircleOrOfOneSideOfIt) {
     cell.weight = noise.uniform(counter++) < 0.2 ? 0.0f : 2.0f;
   }
   const CellColumns columns(cells);
-  for (const auto target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  on_every_instruction_set([&] {
     for (const WindowPlace& place :
          {WindowPlace{15, 10, 1, 6}, {0, 0, 1, 6}, {29, 20, 1, 5.5}, {13, 4, 1, 6, 0.6, -0.8}}) {
       Window window;
@@ -85,7 +79,7 @@ TEST(WindowSums, GatherTheCellsOfACircleOrOfOneSideOfIt) {
           const bool behind = u * place.towards_p + v * place.towards_q < -0.75;
           if (!(cell.weight > 0) || std::hypot(u, v) >= r || behind) continue;
           should_be_nearest = std::min(should_be_nearest, std::hypot(u, v));
-          ASSERT_LT(n, window.size) << hwy::TargetName(target);
+          ASSERT_LT(n, window.size);
           EXPECT_NEAR(window.u[n], u / r, 1e-6);
           EXPECT_NEAR(window.v[n], v / r, 1e-6);
           EXPECT_NEAR(window.uu[n], (u * u + cell.pp) / (r * r), 1e-6);
@@ -96,12 +90,10 @@ TEST(WindowSums, GatherTheCellsOfACircleOrOfOneSideOfIt) {
           EXPECT_NEAR(window.kernel[n], std::pow(1 - (u * u + v * v) / (r * r), 2), 1e-6);
           ++n;
         }
-      EXPECT_EQ(window.size, n) << hwy::TargetName(target);
+      EXPECT_EQ(window.size, n);
       EXPECT_NEAR(nearest, should_be_nearest, 1e-5);
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  });
 }
 
 TEST(FitCells, BlendsToWhatFitsOfTheirOwnSay) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <random>
 
+#include "pagesweep/base/instruction_sets_testing.h"
 #include "pagesweep/sim/analytic_scene.h"
 #include "pagesweep/triangulation/ray_batch_internal.h"
 
@@ -17,16 +17,6 @@ class RayBatchTest : public testing::Test {
   RayBatchTest() {
     from.distortion = {-0.11, 0.04, 8e-4, -5e-4, 0.02};
     to.distortion = {-0.09, 0.03, -6e-4, 7e-4, -0.01};
-  }
-  ~RayBatchTest() override { hwy::SetSupportedTargetsForTest(0); }
-
-  template <class Body>
-  static void on_every_target(const Body& body) {
-    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      SCOPED_TRACE(hwy::TargetName(target));
-      hwy::SetSupportedTargetsForTest(target);
-      body();
-    }
   }
 
   Rig rig = sim::make_test_rig(160);
@@ -47,7 +37,7 @@ TEST_F(RayBatchTest, RaysThroughAPointMeetThereAndItsPictureMovesAsTheProjection
     rays.second_x[rays.count] = second.x() / second.z();
     rays.second_y[rays.count] = second.y() / second.z();
   }
-  on_every_target([&] {
+  on_every_instruction_set([&] {
     intersect(RayPair(from, to), rays);
     for (std::size_t k = 0; k < rays.count; ++k) {
       const Eigen::Vector3d found(rays.x[k], rays.y[k], rays.z[k]), in_to = to.cam_from_rig * points[k];
@@ -71,7 +61,7 @@ TEST_F(RayBatchTest, TheGapIsWhatTheOtherCameraSeesOfIt) {
   rays.count = 1;
   rays.first_x[0] = first.x() / first.z(), rays.first_y[0] = first.y() / first.z();
   rays.second_x[0] = second.x() / second.z(), rays.second_y[0] = second.y() / second.z();
-  on_every_target([&] {
+  on_every_instruction_set([&] {
     intersect(RayPair(from, to), rays);
     // Seen from aside, the shortest way between the rays is shorter by the cosine of an angle of 2 mm in 600.
     EXPECT_NEAR(rays.gap_px[0], gap_mm * to.fx / (point - to.center()).norm(), 1e-4 * rays.gap_px[0]);
@@ -84,7 +74,7 @@ TEST_F(RayBatchTest, RaysThatArePartingOrParallelDoNotMeet) {
   RayBatch rays;
   rays.count = 3;
   rays.second_x = {-0.2, 0.2, 0};  // the camera to the right looks left, right, straight on
-  on_every_target([&] {
+  on_every_instruction_set([&] {
     intersect(RayPair(from, to), rays);
     EXPECT_NEAR(rays.depth[0], 500, 1e-9);
     EXPECT_TRUE(std::isnan(rays.depth[1]));
