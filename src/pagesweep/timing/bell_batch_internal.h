@@ -29,8 +29,16 @@ struct BellBatch {
   Each<const float*> late{};     ///< for each of them [frames] by which it was exposed later; all null: not at all
 
   alignas(64) Each<float> time{}, amplitude{}, background{}, sigma{}, chi_square{};
-  Each<bool> good{};
-  Each<float> left_to{};  ///< of a bell that is not good: where it left for, 0 if nowhere
+  alignas(64) Each<float> good{};  ///< 1, or 0; 0 from `count` on
+  alignas(64) Each<float> arrived{};
+  alignas(64) Each<float> left_to{};  ///< of a bell that refine() finds to be no good: where it left for, 0 if nowhere
+
+  // For refine_widths() alone.
+  const BellTables* tables = nullptr;
+  float width_prior = 0;      ///< 1 / variance of the log width as it is known beforehand, around 0
+  float widest = 0;           ///< log width that no bell exceeds, to either side
+  Each<float> log_width{};    ///< where it starts and what comes out
+  Each<float> width_sigma{};  ///< of the log width
 };
 
 /// Least squares steps with even weights until all good bells are near; what goes astray is good no longer.
@@ -40,5 +48,9 @@ void approach(BellBatch& batch);
 /// Gauss-Newton steps with every sample weighted by the noise expected there, until they are small against sigma.
 /// Amplitude, background and time are where they start.
 void refine(BellBatch& batch);
+
+/// The same with the width as a fourth unknown. Changes the tables with it.
+/// \pre the tables cover all widths
+void refine_widths(BellBatch& batch);
 
 }  // namespace pagesweep

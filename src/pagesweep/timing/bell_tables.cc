@@ -28,6 +28,7 @@ BellTable make_table(const StripeProfile& profile, double reach, double log_widt
   const double width = std::exp(log_width);
   BellTable table;
   table.log_width = static_cast<float>(log_width);
+  table.width = static_cast<float>(width);
   table.reach = static_cast<int>(std::ceil(reach * width));
   const int count = 2 * table.reach + 1;
   table.length = (count + most_bells - 1) / most_bells * most_bells;
@@ -44,6 +45,13 @@ BellTable make_table(const StripeProfile& profile, double reach, double log_widt
       table.value[first + static_cast<std::size_t>(k)] = static_cast<float>(value);
       table.slope[first + static_cast<std::size_t>(k)] = static_cast<float>(slope / width);
     }
+    float flanks[2] = {};
+    for (int k = 0; k < count; ++k) {
+      const float slope = table.slope[first + static_cast<std::size_t>(k)];
+      flanks[slope > 0 ? 0 : 1] += slope * slope;
+    }
+    table.rising.push_back(flanks[0]);
+    table.falling.push_back(flanks[1]);
     const Eigen::MatrixXf weights = solution_weights(&table.value[first], &table.slope[first], count);
     for (int k = 0; k < count; ++k) {
       table.amplitude_weight[first + static_cast<std::size_t>(k)] = weights(0, k);

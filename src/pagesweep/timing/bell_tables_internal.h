@@ -18,13 +18,22 @@ namespace pagesweep {
 struct BellTable {
   static constexpr int phases = 32;  ///< a frame
   static double phase_of(int row) { return static_cast<double>(row) / phases - 0.5; }
+  /// The row for a bell `phase` frames after a whole frame.
+  static int row_of(double phase) { return static_cast<int>((phase + 0.5) * phases + 0.5); }
 
   float log_width = 0;                                                   ///< relative to the profile
+  float width = 1;                                                       ///< likewise
   int reach = 0;                                                         ///< [frames] to both sides
   int length = 0;                                                        ///< 2 reach + 1, rounded up to whole vectors
   std::vector<float> value, slope;                                       ///< of the profile; slope by frames
   std::vector<float> amplitude_weight, background_weight, slope_weight;  ///< least squares solution
   std::vector<float> inside;                                             ///< [length] 1 for samples within reach
+  std::vector<float> rising, falling;                                    ///< [phases + 1] sums of squared slopes
+
+  /// What the samples of one flank, 0: rising, 1: falling, tell about the time: their sum of squared slopes.
+  double flank(int side, int row) const {
+    return static_cast<double>((side == 0 ? rising : falling)[static_cast<std::size_t>(row)]);
+  }
 };
 
 /// Tables for all stripe widths, a percent apart. What lies between two rows is reached by the slope: an error below

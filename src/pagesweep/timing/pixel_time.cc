@@ -17,9 +17,10 @@ struct Flank {
   double usable = 0;    ///< neither clipped nor dropped
   double clipped = 0;
 };
+using Flanks = std::array<Flank, 2>;
 
-std::array<Flank, 2> examine_flanks(const PixelWindow& window, const Bell& bell, const PixelJudge& judge) {
-  std::array<Flank, 2> flanks;
+Flanks examine_flanks(const PixelWindow& window, const Bell& bell, const PixelJudge& judge) {
+  Flanks flanks;
   const int begin = static_cast<int>(std::ceil(bell.time + bell.width * judge.profile.begin()));
   const int end = static_cast<int>(std::floor(bell.time + bell.width * judge.profile.end()));
   for (int i = begin; i <= end; ++i) {
@@ -36,6 +37,26 @@ std::array<Flank, 2> examine_flanks(const PixelWindow& window, const Bell& bell,
     const float gray = window.gray[static_cast<std::size_t>(at)];
     if (std::isfinite(gray)) flank.usable += information;
     if (std::isinf(gray)) flank.clipped += information;
+  }
+  return flanks;
+}
+
+/// The same of samples none of which is clipped.
+Flanks examine_flanks(const BellPlace& place, const PixelJudge& judge) {
+  const BellTable& table = *place.table;
+  const float* slope = &table.slope[static_cast<std::size_t>(place.row * table.length)];
+  Flanks flanks;
+  for (int side = 0; side < 2; ++side) {
+    Flank& flank = flanks[static_cast<std::size_t>(side)];
+    flank.whole = flank.recorded = flank.usable = table.flank(side, place.row);
+  }
+  for (int k = 0; k <= 2 * table.reach; ++k) {
+    if (place.present[k] > 0) continue;
+    Flank& flank = flanks[slope[k] > 0 ? 0 : 1];
+    const auto information = static_cast<double>(slope[k] * slope[k]);
+    flank.usable -= information;
+    const int frame = place.first_frame + k;
+    if (frame < 0 || frame >= judge.frame_count) flank.recorded -= information;
   }
   return flanks;
 }
@@ -68,7 +89,8 @@ double noise_limit(int samples) { return 1 + 4 * std::sqrt(2.0 / std::max(1, sam
 bool is_lost_in_noise(const Bell& bell, const PixelJudge& judge) {
   // 0.75 times the width at half height: sum of the squared profile of any bell-like stripe.
   const double light = 0.75 * judge.profile.full_width_half_maximum() * bell.width * judge.noise.mean_weight();
-  return bell.amplitude < 5 * std::sqrt(judge.noise.sensor().variance(bell.background) / light);
+  const double variance = judge.noise.sensor().variance(bell.background);
+  return bell.amplitude < 0 || bell.amplitude * bell.amplitude * light < 25 * variance;
 }
 
 bool is_too_faint(const Bell& bell, double sigma, const PixelJudge& judge) {
@@ -114,6 +136,23 @@ bool contradicts(const BellFit& robust, const BellFit& efficient) {
   return std::abs(robust.bell.time - efficient.bell.time) > 2 * std::sqrt(variance);
 }
 
+/// What judge_bell() looks at besides the residuals.
+/// \param flanks  gives them
+template <class FlanksOf>
+PixelStatus judge_but_for_shape(const Bell& bell, double sigma, const PixelJudge& judge, const FlanksOf& flanks) {
+  constexpr double least_recorded = 0.6, least_usable = 0.02;
+  if (!std::isfinite(bell.time) || !std::isfinite(sigma)) return PixelStatus::bad_fit;
+  if (is_lost_in_noise(bell, judge)) return PixelStatus::too_dark;
+  if (bell.time < 0 || bell.time > judge.frame_count - 1) return PixelStatus::truncated;
+  const Flanks both = flanks();
+  for (const Flank& flank : both)
+    if (flank.recorded < least_recorded * flank.whole) return PixelStatus::truncated;
+  for (const Flank& flank : both)
+    if (flank.usable < least_usable * flank.whole)
+      return flank.clipped > 0 ? PixelStatus::saturated : PixelStatus::truncated;
+  return is_too_faint(bell, sigma, judge) ? PixelStatus::too_dark : PixelStatus::ok;
+}
+
 PixelTime describe(const PixelWindow& window, const Bell& bell, double sigma, double residual,
                    const PixelJudge& judge) {
   return {.time = bell.time,
@@ -128,19 +167,17 @@ PixelTime describe(const PixelWindow& window, const Bell& bell, double sigma, do
 }  // namespace
 
 PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma, const PixelJudge& judge) {
-  constexpr double least_recorded = 0.6, least_usable = 0.02, most_misfit = 0.1;
-  if (!std::isfinite(bell.time) || !std::isfinite(sigma)) return PixelStatus::bad_fit;
-  if (is_lost_in_noise(bell, judge)) return PixelStatus::too_dark;
-  if (bell.time < 0 || bell.time > judge.frame_count - 1) return PixelStatus::truncated;
-  const auto flanks = examine_flanks(window, bell, judge);
-  for (const Flank& flank : flanks)
-    if (flank.recorded < least_recorded * flank.whole) return PixelStatus::truncated;
-  for (const Flank& flank : flanks)
-    if (flank.usable < least_usable * flank.whole)
-      return flank.clipped > 0 ? PixelStatus::saturated : PixelStatus::truncated;
-  if (is_too_faint(bell, sigma, judge)) return PixelStatus::too_dark;
-  if (!judge.refuse_misfits) return PixelStatus::ok;
-  return misfits(window, bell, judge, most_misfit) ? PixelStatus::bad_fit : PixelStatus::ok;
+  constexpr double most_misfit = 0.1;
+  const auto flanks = [&] { return examine_flanks(window, bell, judge); };
+  const PixelStatus status = judge_but_for_shape(bell, sigma, judge, flanks);
+  if (status != PixelStatus::ok || !judge.refuse_misfits) return status;
+  return misfits(window, bell, judge, most_misfit) ? PixelStatus::bad_fit : status;
+}
+
+PixelStatus judge_partial_bell(const PlainBells::Fit& fit, double sigma, const BellPlace& place, double width,
+                               const PixelJudge& judge) {
+  const Bell bell{fit.amplitude, fit.background, fit.time, width};
+  return judge_but_for_shape(bell, sigma, judge, [&] { return examine_flanks(place, judge); });
 }
 
 std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double width, const PixelJudge& judge) {

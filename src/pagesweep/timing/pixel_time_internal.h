@@ -76,4 +76,16 @@ std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double w
 /// clipped nor dropped; samples around the middle must follow the profile to within a few percent of the height.
 PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma, const PixelJudge& judge);
 
+/// Where a plain bell lies in its table and its samples.
+struct BellPlace {
+  const BellTable* table;
+  int row;
+  int first_frame;       ///< of the row's first entry
+  const float* present;  ///< for each entry of the row 1, or 0 where there is no sample
+};
+
+/// The same of a plain bell of which samples are missing, and whose chi square is no more than noise.
+PixelStatus judge_partial_bell(const PlainBells::Fit& fit, double sigma, const BellPlace& place, double width,
+                               const PixelJudge& judge);
+
 }  // namespace pagesweep

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "pagesweep/timing/plain_bells_internal.h"
+#include "pagesweep/timing/stripe_width.h"
 
 namespace pagesweep {
 
@@ -18,30 +19,54 @@ PlainBells::PlainBells(const BellTables& tables, const SensorNoise& noise, doubl
   batch_.longest_step = static_cast<float>(0.3 * fwhm);
   batch_.read_variance = static_cast<float>(noise.read_variance);
   batch_.gain = static_cast<float>(noise.gain);
+  batch_.tables = &tables;
+  batch_.width_prior = 1 / (0.2F * 0.2F);
+  batch_.widest = static_cast<float>(std::log(widest_stripe));
 }
 
-void PlainBells::add(int centre, double log_width, const float* gray, const float* present, const float* late) {
+void PlainBells::add(int centre, const BellTable& table, float log_width, const float* gray, const float* present,
+                     const float* late) {
   const auto i = static_cast<std::size_t>(batch_.count++);
   centre_[i] = centre;
-  batch_.table[i] = &tables_.at(log_width);
-  batch_.width_rest[i] = static_cast<float>(log_width) - batch_.table[i]->log_width;
+  batch_.table[i] = &table;
+  batch_.log_width[i] = log_width;
+  batch_.width_rest[i] = log_width - table.log_width;
   batch_.gray[i] = gray;
   batch_.present[i] = present;
   batch_.late[i] = late;
-  batch_.time[i] = 0;
-  batch_.good[i] = true;
-  batch_.left_to[i] = 0;
+}
+
+void PlainBells::clear() {
+  batch_.count = 0;
+  batch_.good.fill(0);
+}
+
+void PlainBells::start(bool partial) {
+  batch_.time.fill(0);
+  batch_.left_to.fill(0);
+  std::fill_n(batch_.good.begin(), batch_.count, 1.0F);
+  partial ? start_from_extremes() : approach(batch_);
 }
 
 void PlainBells::fit() {
-  approach(batch_);
+  start(false);
   refine(batch_);
 }
 
 void PlainBells::fit_partial() {
+  start(true);
+  refine(batch_);
+}
+
+void PlainBells::fit_widths(bool partial) {
+  start(partial);
+  refine_widths(batch_);
+}
+
+void PlainBells::start_from_extremes() {
   for (std::size_t i = 0; i < static_cast<std::size_t>(batch_.count); ++i) {
     float low = std::numeric_limits<float>::infinity(), high = 0;
-    const int around = batch_.table[i]->reach + margin_;
+    const int around = reach(*batch_.table[i]);
     for (int k = reach() - around; k <= reach() + around; ++k) {
       if (batch_.present[i][k] == 0) continue;
       low = std::min(low, batch_.gray[i][k]);
@@ -49,24 +74,26 @@ void PlainBells::fit_partial() {
     }
     batch_.background[i] = low;
     batch_.amplitude[i] = std::max(high - low, 1.0F);
-    batch_.good[i] = std::isfinite(low);
+    batch_.good[i] = std::isfinite(low) ? 1.0F : 0.0F;
   }
-  refine(batch_);
 }
 
 PlainBells::Fit PlainBells::operator[](int k) const {
   const auto i = static_cast<std::size_t>(k);
+  const bool is_good = batch_.good[i] > 0;
   const int reach = batch_.table[i]->reach,
             first = batch_.middle + static_cast<int>(std::lround(batch_.time[i])) - reach;
-  const int samples =
-      static_cast<int>(std::count(batch_.present[i] + first, batch_.present[i] + first + 2 * reach + 1, 1.0F));
-  return {batch_.good[i],
-          static_cast<double>(centre_[i]) + static_cast<double>(batch_.good[i] ? batch_.time[i] : batch_.left_to[i]),
+  int samples = 0;
+  for (int n = first; n <= first + 2 * reach; ++n) samples += batch_.present[i][n] > 0;
+  return {is_good,
+          static_cast<double>(centre_[i]) + static_cast<double>(is_good ? batch_.time[i] : batch_.left_to[i]),
           batch_.amplitude[i],
           batch_.background[i],
           batch_.sigma[i],
           std::max(0.0F, batch_.chi_square[i]),
-          samples};
+          samples,
+          batch_.log_width[i],
+          batch_.width_sigma[i]};
 }
 
 }  // namespace pagesweep

@@ -25,6 +25,8 @@ class PlainBells {
     double time_sigma = 0;   ///< [frames] from the noise alone
     double chi_square = 0;   ///< of all samples
     int samples = 0;
+    double log_width = 0;        ///< after fit_widths(), relative to the profile
+    double log_width_sigma = 0;  ///< likewise
   };
 
   /// \param tables  must outlive this
@@ -33,24 +35,35 @@ class PlainBells {
 
   /// How many samples before and after the expected middle frame every pixel must have.
   int reach() const { return batch_.middle; }
-  /// How many of them are looked at where the stripe is that wide.
-  int reach(double log_width) const { return tables_.at(log_width).reach + margin_; }
+  /// How many of them are looked at with this table.
+  int reach(const BellTable& table) const { return table.reach + margin_; }
+  /// The table that bells of a width are fitted with.
+  const BellTable& table(double log_width) const { return tables_.at(log_width); }
 
-  void clear() { batch_.count = 0; }
+  void clear();
   /// Another pixel. The arrays must last until fit() and reach `most_bells` entries beyond the samples.
+  /// \param table    of log_width, see table()
   /// \param gray     samples of frames centre - reach() ... centre + reach(); any number where there is none
   /// \param present  for each of them 1 if it is there, else 0
   /// \param late     for each of them [frames] by which it was exposed later; null for all pixels: not at all
-  void add(int centre, double log_width, const float* gray, const float* present, const float* late = nullptr);
+  void add(int centre, const BellTable& table, float log_width, const float* gray, const float* present,
+           const float* late = nullptr);
   /// [frames] Samples that were exposed more than this before or after their frame are none of a plain case.
   double most_late() const { return most_late_; }
-  /// Bells whose samples are all there.
+  /// Bells whose samples are all there, but for some at their feet, in whose place stand others from there.
   void fit();
-  /// Bells of which some samples are missing.
+  /// Bells of which any samples are missing, or exposed later.
   void fit_partial();
+  /// Bells whose width is unknown, too; log_width is where it starts. \pre the tables cover all widths
+  /// \param partial  whether they are those of fit_partial()
+  void fit_widths(bool partial);
+  int count() const { return batch_.count; }
   Fit operator[](int i) const;
 
  private:
+  void start(bool partial);
+  void start_from_extremes();
+
   const BellTables& tables_;
   int margin_;  ///< [frames] the expected middle may be off
   double most_late_;

@@ -7,7 +7,7 @@
 
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/timing/tile_times_internal.h"
-#include "pagesweep/timing/width_tiles_internal.h"
+#include "pagesweep/timing/width_meter_internal.h"
 
 namespace pagesweep {
 namespace {
@@ -72,14 +72,15 @@ std::array<float, 9> RecordedTimes::widths_around(const Tile& tile) const {
 }
 
 void RecordedTimes::measure_widths(const std::vector<Tile*>& tiles) {
-  if (!measures_widths_) return;
+  if (!measures_widths_ || tiles.empty()) return;
+  tables_.cover({1 / widest_stripe, widest_stripe});
   const StripeWindows& windows = recorder_.windows();
   for_tiles(tiles.size(), [&](int begin, int end) {
-    RecordedWindows row(windows, profile_, noise_);
+    WidthMeter meter(windows, tables_, profile_, noise_);
     for (int i = begin; i < end; ++i) {
       Tile& tile = *tiles[static_cast<std::size_t>(i)];
       const WidthTile place = width_tile(windows.sequence().width, windows.sequence().height, tile.column, tile.row);
-      width_tiles_(tile.column, tile.row) = measure_width(row, place, profile_, noise_);
+      width_tiles_(tile.column, tile.row) = meter.measure(place);
       tile.measured_from = recorded(tile);
       tile.measured_clear = clear(tile);
     }

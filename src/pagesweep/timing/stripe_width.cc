@@ -13,48 +13,6 @@
 namespace pagesweep {
 namespace {
 
-constexpr int row_step = 8, column_step = 3;  // some 40 pixels a tile: half a percent each, a thousandth together
-
-struct Measured {
-  double log_width, weight;
-};
-
-/// Weighted mean of what is near the weighted median; NaN without any.
-float robust_mean(std::vector<Measured>& values) {
-  if (values.size() < 3) return not_a_number;
-  std::ranges::sort(values, {}, &Measured::log_width);
-  double total = 0, passed = 0;
-  for (const Measured& value : values) total += value.weight;
-  double median = 0;
-  for (const Measured& value : values) {
-    median = value.log_width;
-    if ((passed += value.weight) >= 0.5 * total) break;
-  }
-  const double spread = values[values.size() * 3 / 4].log_width - values[values.size() / 4].log_width;
-  double weight = 0, sum = 0;
-  for (const Measured& value : values) {
-    if (std::abs(value.log_width - median) > 1.5 * spread + 1e-4) continue;
-    weight += value.weight;
-    sum += value.weight * value.log_width;
-  }
-  const double widest = std::log(widest_stripe);
-  return static_cast<float>(std::clamp(sum / weight, -widest, widest));
-}
-
-/// \param row  RowWindows or RecordedWindows
-template <class Row>
-void measure_pixel(Row& row, int x, const StripeProfile& profile, const FrameNoise& noise,
-                   std::vector<Measured>& values) {
-  if (row.significance(x) < 15) return;  // its width would be worth little
-  const PixelWindow window = row.window(x, 1);
-  const BellFit fit = fit_bell(window.gray, window.first_frame, profile, noise, window.start,
-                               {.unknowns = BellUnknowns::width, .late = window.late});
-  if (!fit.converged || fit.reduced_chi_square() > 100) return;
-  // What a model cannot do better than a percent does not count more for being brighter.
-  const double variance = fit.covariance(3, 3) + 1e-4;
-  if (variance < 0.01) values.push_back({std::log(fit.bell.width), 1 / variance});
-}
-
 /// Tiles without a value take the mean of their neighbours that have one, step by step from the border of the known.
 void fill(Image<float>& tiles) {
   for (bool changed = true; changed;) {
@@ -80,20 +38,6 @@ void fill(Image<float>& tiles) {
     if (std::isnan(tile)) tile = 0;
 }
 
-/// Measures one tile; NaN without light.
-template <class Row>
-float measure_tile(Row& row, const WidthTile& tile, const StripeProfile& profile, const FrameNoise& noise) {
-  std::vector<Measured> values;
-  for (int y = tile.top; y < tile.top + tile.height; y += row_step) {
-    row.read(y, tile.left, tile.width);
-    // The columns take turns, counted over the whole picture.
-    const int phase = y / row_step % column_step;
-    const int first = tile.left + (phase - tile.left % column_step + column_step) % column_step;
-    for (int x = first; x < tile.left + tile.width; x += column_step) measure_pixel(row, x, profile, noise, values);
-  }
-  return robust_mean(values);
-}
-
 }  // namespace
 
 WidthTile width_tile(int width, int height, int column, int row) {
@@ -103,9 +47,39 @@ WidthTile width_tile(int width, int height, int column, int row) {
 
 int width_tiles(int pixels) { return (pixels + width_tile_px - 1) / width_tile_px; }
 
-float measure_width(RecordedWindows& row, const WidthTile& tile, const StripeProfile& profile,
-                    const FrameNoise& noise) {
-  return measure_tile(row, tile, profile, noise);
+float robust_width(std::vector<MeasuredWidth>& values) {
+  if (values.size() < 3) return not_a_number;
+  std::ranges::sort(values, {}, &MeasuredWidth::log_width);
+  double total = 0, passed = 0;
+  for (const MeasuredWidth& value : values) total += value.weight;
+  double median = 0;
+  for (const MeasuredWidth& value : values) {
+    median = value.log_width;
+    if ((passed += value.weight) >= 0.5 * total) break;
+  }
+  const double spread = values[values.size() * 3 / 4].log_width - values[values.size() / 4].log_width;
+  double weight = 0, sum = 0;
+  for (const MeasuredWidth& value : values) {
+    if (std::abs(value.log_width - median) > 1.5 * spread + 1e-4) continue;
+    weight += value.weight;
+    sum += value.weight * value.log_width;
+  }
+  const double widest = std::log(widest_stripe);
+  return static_cast<float>(std::clamp(sum / weight, -widest, widest));
+}
+
+void note_width(double log_width, double sigma, double reduced_chi_square, std::vector<MeasuredWidth>& widths) {
+  if (reduced_chi_square > 100) return;
+  // What a model cannot do better than a percent does not count more for being brighter.
+  const double variance = sigma * sigma + 1e-4;
+  if (variance < 0.01) widths.push_back({log_width, 1 / variance});
+}
+
+void measure_width_alone(const PixelWindow& window, const StripeProfile& profile, const FrameNoise& noise,
+                         std::vector<MeasuredWidth>& widths) {
+  const BellFit fit = fit_bell(window.gray, window.first_frame, profile, noise, window.start,
+                               {.unknowns = BellUnknowns::width, .late = window.late});
+  if (fit.converged) note_width(std::log(fit.bell.width), fit.log_width_sigma(), fit.reduced_chi_square(), widths);
 }
 
 StripeWidths widths_of_tiles(Image<float> tiles) {
@@ -154,8 +128,18 @@ StripeWidths measure_widths(const Frames& frames, const StripeProfile& profile, 
   const FrameNoise frame_noise(noise, frames.sequence().exposures);
   parallel_rows(tiles.height(), [&](int y) {
     RowWindows row(frames, profile, frame_noise);
-    for (int x = 0; x < tiles.width(); ++x)
-      tiles(x, y) = measure_tile(row, width_tile(frames.width(), frames.height(), x, y), profile, frame_noise);
+    std::vector<MeasuredWidth> widths;
+    for (int x = 0; x < tiles.width(); ++x) {
+      const WidthTile tile = width_tile(frames.width(), frames.height(), x, y);
+      widths.clear();
+      int read = -1;
+      for_width_pixels(tile, [&](int column, int line) {
+        if (read != line) row.read(read = line, tile.left, tile.width);
+        if (row.significance(column) >= least_significance_of_width)
+          measure_width_alone(row.window(column, 1), profile, frame_noise, widths);
+      });
+      tiles(x, y) = robust_width(widths);
+    }
   });
   return widths_of_tiles(std::move(tiles));
 }

@@ -6,8 +6,6 @@
 #include <cstddef>
 #include <span>
 
-#include "pagesweep/timing/row_kernels_internal.h"
-
 namespace pagesweep {
 namespace {
 
@@ -23,90 +21,65 @@ TileTimes::TileTimes(const StripeWindows& windows, const BellTables& tables, con
       map_(map),
       alone_(windows, judge.profile, judge.noise),
       bells_(tables, judge.noise.sensor(), judge.profile.full_width_half_maximum()),
-      // What follows a pixel's samples is another's, or 0.
-      light_(static_cast<std::size_t>(tile_pixels * windows.length() + most_bells)) {}
+      reader_(windows, bells_, judge.profile.full_width_half_maximum()) {}
 
 void TileTimes::estimate(int y, int left, int columns) {
+  using enum BellSamples::Kind;
   alone_.read(y);
-  log_widths_.resize(tile_pixels);
-  for (int first = left; first < left + columns; first += tile_pixels) {
-    gather(y, first, std::min(tile_pixels, left + columns - first));
+  log_widths_.resize(most_bells);
+  for (int first = left; first < left + columns; first += most_bells) {
+    gather(y, first, std::min(most_bells, left + columns - first));
     if (candidates_.empty()) continue;
-    for (const Sampling sampled : {Sampling::whole, Sampling::partial, Sampling::uneven}) fit(sampled, y);
+    for (const BellSamples::Kind kind : {core, partial, uneven}) fit(kind, y);
     for (const Candidate& candidate : candidates_)
-      if (sampling(candidate) == Sampling::too_uneven) set_time(map_, candidate.x, y, look_closely(candidate));
+      if (candidate.samples.kind == too_uneven || candidate.samples.kind == clipped)
+        set_time(map_, candidate.x, y, look_closely(candidate));
   }
 }
 
 void TileTimes::gather(int y, int left, int columns) {
-  const Sequence& sequence = windows_.sequence();
-  const auto black = static_cast<float>(sequence.black_level), saturation = static_cast<float>(sequence.saturation);
-  const auto length = static_cast<std::size_t>(windows_.length());
   candidates_.clear();
   widths_.log_row(y, left, std::span(log_widths_).first(static_cast<std::size_t>(columns)));
   for (int k = 0; k < columns; ++k) {
-    const int x = left + k, centre = windows_.centre(x, y);
-    if (centre == StripeWindows::none) {
+    const int x = left + k;
+    if (windows_.centre(x, y) == StripeWindows::none)
       set_time(map_, x, y, {});
-      continue;
-    }
-    float* light = &light_[static_cast<std::size_t>(k) * length];
-    const Candidate candidate{x, centre, log_widths_[static_cast<std::size_t>(k)],
-                              windows_.significance(x, y) < hardly_significant, light};
-    const float most = windows_.is_8_bit() ? take_off(windows_.gray<std::uint8_t>(x, y), length, black, light)
-                                           : take_off(windows_.gray<std::uint16_t>(x, y), length, black, light);
-    if (most >= saturation && is_clipped(candidate))
-      set_time(map_, x, y, look_closely(candidate));
     else
-      candidates_.push_back(candidate);
+      candidates_.push_back({x, reader_.read(x, y, log_widths_[static_cast<std::size_t>(k)], k),
+                             windows_.significance(x, y) < hardly_significant});
   }
 }
 
-bool TileTimes::is_clipped(const Candidate& candidate) const {
-  const auto limit = static_cast<float>(windows_.sequence().saturation - windows_.sequence().black_level);
-  const int reach = bells_.reach(candidate.log_width), first = windows_.half() - reach;
-  const float* present = windows_.present(candidate.centre - reach);
-  for (int k = 0; k <= 2 * reach; ++k)
-    if (candidate.light[first + k] >= limit && present[k] > 0) return true;
-  return false;
-}
-
-TileTimes::Sampling TileTimes::sampling(const Candidate& candidate) const {
-  const int reach = bells_.reach(candidate.log_width), first = candidate.centre - reach, count = 2 * reach + 1;
-  const bool is_whole = windows_.are_present(first, count);
-  if (windows_.are_even(first, count)) return is_whole ? Sampling::whole : Sampling::partial;
-  const std::span late(windows_.late(first), static_cast<std::size_t>(count));
-  const bool is_plain =
-      std::ranges::all_of(late, [most = bells_.most_late()](float frames) { return std::abs(frames) <= most; });
-  return is_plain ? Sampling::uneven : Sampling::too_uneven;
-}
-
-void TileTimes::fit(Sampling sampled, int y) {
+void TileTimes::fit(BellSamples::Kind kind, int y) {
   bells_.clear();
   fitted_.clear();
   for (const Candidate& candidate : candidates_) {
-    if (sampling(candidate) != sampled) continue;
-    fitted_.push_back(candidate);
-    const int first = candidate.centre - windows_.half();
-    bells_.add(candidate.centre, candidate.log_width, candidate.light, windows_.present(first),
-               sampled == Sampling::uneven ? windows_.late(first) : nullptr);
+    if (candidate.samples.kind != kind) continue;
+    fitted_.push_back(&candidate);
+    reader_.add_to(bells_, candidate.samples);
   }
   if (fitted_.empty()) return;
-  sampled == Sampling::whole ? bells_.fit() : bells_.fit_partial();
+  kind == BellSamples::Kind::core ? bells_.fit() : bells_.fit_partial();
   for (std::size_t i = 0; i < fitted_.size(); ++i) {
-    const Candidate& candidate = fitted_[i];
+    const Candidate& candidate = *fitted_[i];
     const PlainBells::Fit bell = bells_[static_cast<int>(i)];
-    auto time = time_of_plain_bell(bell, std::exp(candidate.log_width), judge_);
-    if (time && time->status != PixelStatus::truncated && sampled != Sampling::whole &&
-        !is_recorded(*time, candidate.log_width))
-      time->status = judge_partial(candidate, *time);
+    auto time = time_of(candidate, bell);
     if (!time) time = candidate.may_be_noise ? PixelTime{} : look_closely(candidate, &bell);
     set_time(map_, candidate.x, y, *time);
   }
 }
 
+std::optional<PixelTime> TileTimes::time_of(const Candidate& candidate, const PlainBells::Fit& bell) const {
+  const BellSamples& samples = candidate.samples;
+  const double width = static_cast<double>(samples.table->width * (1 + samples.log_width - samples.table->log_width));
+  auto time = time_of_plain_bell(bell, width, judge_);
+  if (time && time->status != PixelStatus::truncated && !is_recorded(samples, time->bell_time, width))
+    time->status = judge_partial_bell(bell, time->sigma, place_of(samples, bell.time), width, judge_);
+  return time;
+}
+
 PixelTime TileTimes::look_closely(const Candidate& candidate, const PlainBells::Fit* plain) {
-  const double width = std::exp(candidate.log_width);
+  const double width = std::exp(static_cast<double>(candidate.samples.log_width));
   const auto window_around = [&](int frame) {
     PixelWindow window = alone_.window_at(candidate.x, width, frame);
     if (plain && plain->converged) window.start = {plain->amplitude, plain->background, plain->time, width};
@@ -115,22 +88,17 @@ PixelTime TileTimes::look_closely(const Candidate& candidate, const PlainBells::
   return time_by_likelihood_around(alone_.frame(candidate.x), window_around, judge_);
 }
 
-bool TileTimes::is_recorded(const PixelTime& time, double log_width) const {
-  const double width = std::exp(log_width);
-  const int begin = static_cast<int>(std::floor(time.bell_time + width * judge_.profile.begin()));
-  const int end = static_cast<int>(std::ceil(time.bell_time + width * judge_.profile.end()));
+bool TileTimes::is_recorded(const BellSamples& samples, double time, double width) const {
+  const int reach = bells_.reach(*samples.table);
+  if (windows_.are_present(samples.centre - reach, 2 * reach + 1)) return true;
+  const int begin = static_cast<int>(std::floor(time + width * judge_.profile.begin()));
+  const int end = static_cast<int>(std::ceil(time + width * judge_.profile.end()));
   return windows_.are_present(begin, end - begin + 1);
 }
 
-PixelStatus TileTimes::judge_partial(const Candidate& candidate, const PixelTime& time) {
-  const int reach = bells_.reach(candidate.log_width), first = candidate.centre - windows_.half();
-  const int begin = std::max(0, candidate.centre - reach);
-  const int end = std::min(judge_.frame_count, candidate.centre + reach + 1);
-  window_.clear();
-  for (int i = begin; i < end; ++i)
-    window_.push_back(*windows_.present(i) > 0 ? candidate.light[i - first] : not_a_number);
-  const Bell bell{time.amplitude, time.background, time.bell_time, std::exp(candidate.log_width)};
-  return judge_bell({window_, begin, bell}, bell, time.sigma, judge_);
+BellPlace TileTimes::place_of(const BellSamples& samples, double time) const {
+  const int frame = static_cast<int>(std::lround(time)), first = frame - samples.table->reach;
+  return {samples.table, BellTable::row_of(time - frame), first, windows_.present(first)};
 }
 
 }  // namespace pagesweep

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "pagesweep/data/time_map.h"
+#include "pagesweep/timing/bell_samples_internal.h"
 #include "pagesweep/timing/pixel_time_internal.h"
-#include "pagesweep/timing/plain_bells_internal.h"
 #include "pagesweep/timing/recorded_windows_internal.h"
 #include "pagesweep/timing/stripe_width.h"
 
@@ -24,25 +25,20 @@ class TileTimes {
 
  private:
   struct Candidate {
-    int x;       ///< column
-    int centre;  ///< [frames] of the bell, nearly
-    double log_width;
-    bool may_be_noise;   ///< a bell at the limit of judge_bell(): if it cannot be fitted it is none
-    const float* light;  ///< its samples, black level removed, from the window's first on
+    int x;  ///< column
+    BellSamples samples;
+    bool may_be_noise;  ///< a bell at the limit of judge_bell(): if it cannot be fitted it is none
   };
 
   void gather(int y, int left, int columns);
-  bool is_clipped(const Candidate& candidate) const;
-  /// How its samples were taken.
-  enum class Sampling { whole, partial, uneven, too_uneven };
-  Sampling sampling(const Candidate& candidate) const;
-  void fit(Sampling sampling, int y);
+  void fit(BellSamples::Kind kind, int y);
+  /// The verdict of the fit, if it is one.
+  std::optional<PixelTime> time_of(const Candidate& candidate, const PlainBells::Fit& bell) const;
   /// \param plain  its fit as a plain case, which did not do; null: there is none
   PixelTime look_closely(const Candidate& candidate, const PlainBells::Fit* plain = nullptr);
   /// Whether every frame is there that shows something of the bell.
-  bool is_recorded(const PixelTime& time, double log_width) const;
-  /// The verdict on a bell of which samples are missing.
-  PixelStatus judge_partial(const Candidate& candidate, const PixelTime& time);
+  bool is_recorded(const BellSamples& samples, double time, double width) const;
+  BellPlace place_of(const BellSamples& samples, double time) const;
 
   const StripeWindows& windows_;
   const StripeWidths& widths_;
@@ -50,10 +46,10 @@ class TileTimes {
   TimeMap& map_;
   RecordedWindows alone_;
   PlainBells bells_;
-  std::vector<float> light_;
+  BellReader reader_;
   std::vector<float> log_widths_;
-  std::vector<float> window_;
-  std::vector<Candidate> candidates_, fitted_;
+  std::vector<Candidate> candidates_;
+  std::vector<const Candidate*> fitted_;
 };
 
 }  // namespace pagesweep

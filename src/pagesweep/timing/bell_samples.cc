@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/timing/bell_samples_internal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+
+#include "pagesweep/timing/row_kernels_internal.h"
+
+namespace pagesweep {
+
+BellReader::BellReader(const StripeWindows& windows, const PlainBells& bells, double fwhm)
+    : windows_(windows),
+      bells_(bells),
+      core_(static_cast<int>(std::ceil(1.5 * fwhm)) + 1),
+      // What follows a pixel's samples is another's, or 0.
+      light_(static_cast<std::size_t>(most_bells * windows.length() + most_bells)) {}
+
+BellSamples BellReader::read(int x, int y, float log_width, int slot) {
+  const Sequence& sequence = windows_.sequence();
+  const auto black = static_cast<float>(sequence.black_level), saturation = static_cast<float>(sequence.saturation);
+  const auto length = static_cast<std::size_t>(windows_.length());
+  float* light = &light_[static_cast<std::size_t>(slot) * length];
+  BellSamples samples{windows_.centre(x, y), log_width, &bells_.table(log_width), light};
+  const float most = windows_.is_8_bit() ? take_off(windows_.gray<std::uint8_t>(x, y), length, black, light)
+                                         : take_off(windows_.gray<std::uint16_t>(x, y), length, black, light);
+  samples.kind = most >= saturation && is_clipped(samples) ? BellSamples::Kind::clipped : kind_of(samples);
+  return samples;
+}
+
+bool BellReader::is_clipped(const BellSamples& samples) const {
+  const auto limit = static_cast<float>(windows_.sequence().saturation - windows_.sequence().black_level);
+  const int reach = bells_.reach(*samples.table), first = windows_.half() - reach;
+  const float* present = windows_.present(samples.centre - reach);
+  for (int k = 0; k <= 2 * reach; ++k)
+    if (samples.light[first + k] >= limit && present[k] > 0) return true;
+  return false;
+}
+
+BellSamples::Kind BellReader::kind_of(const BellSamples& samples) const {
+  using enum BellSamples::Kind;
+  const int reach = bells_.reach(*samples.table), first = samples.centre - reach, count = 2 * reach + 1;
+  if (windows_.are_even(first, count))
+    return windows_.are_present(samples.centre - core_, 2 * core_ + 1) ? core : partial;
+  const std::span late(windows_.late(first), static_cast<std::size_t>(count));
+  const bool is_plain =
+      std::ranges::all_of(late, [most = bells_.most_late()](float frames) { return std::abs(frames) <= most; });
+  return is_plain ? uneven : too_uneven;
+}
+
+void BellReader::add_to(PlainBells& bells, const BellSamples& samples) const {
+  const int first = samples.centre - windows_.half();
+  bells.add(samples.centre, *samples.table, samples.log_width, samples.light, windows_.present(first),
+            samples.kind == BellSamples::Kind::uneven ? windows_.late(first) : nullptr);
+}
+
+}  // namespace pagesweep

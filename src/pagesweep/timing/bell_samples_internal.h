@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "pagesweep/timing/plain_bells_internal.h"
+#include "pagesweep/timing/stripe_windows_internal.h"
+
+namespace pagesweep {
+
+/// The samples of one pixel's recorded window, made ready for PlainBells.
+struct BellSamples {
+  enum class Kind {
+    core,        ///< if samples are missing, then at the bell's foot: PlainBells::fit()
+    partial,     ///< others are missing: fit_partial()
+    uneven,      ///< frames were exposed a little late: fit_partial()
+    too_uneven,  ///< no plain case
+    clipped      ///< no plain case
+  };
+  int centre = 0;  ///< [frames] of the bell, nearly
+  float log_width = 0;
+  const BellTable* table = nullptr;
+  const float* light = nullptr;  ///< black level removed, from the window's first on
+  Kind kind = Kind::core;
+};
+
+/// Reads them, up to `most_bells` at a time. One a thread.
+class BellReader {
+ public:
+  /// The arguments must outlive this.
+  BellReader(const StripeWindows& windows, const PlainBells& bells, double fwhm);
+
+  /// \param slot  0 ... most_bells - 1: what was read there before is gone
+  /// \pre the stripe passed the pixel
+  BellSamples read(int x, int y, float log_width, int slot);
+  /// Puts them with the others of their kind.
+  void add_to(PlainBells& bells, const BellSamples& samples) const;
+
+ private:
+  BellSamples::Kind kind_of(const BellSamples& samples) const;
+  bool is_clipped(const BellSamples& samples) const;
+
+  const StripeWindows& windows_;
+  const PlainBells& bells_;
+  int core_;  ///< [frames] to both sides of a bell's expected middle
+  std::vector<float> light_;
+};
+
+}  // namespace pagesweep
