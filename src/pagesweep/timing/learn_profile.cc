@@ -63,9 +63,82 @@ double crossing(std::span<const float> gray, int from, int direction, float leve
   return std::numeric_limits<double>::quiet_NaN();
 }
 
+/// Whether each column of samples of one exposure may be a complete bell clearly above the noise. What examine() would
+/// take is never refused; most of what it would not take is, side by side and without sorting.
+class Glance {
+ public:
+  /// \param step  from one column to the next
+  void look(const Image<float>& samples, int step, float ceiling) {
+    columns_ = static_cast<std::size_t>((samples.width() + step - 1) / step);
+    gather(samples, step, ceiling);
+    outline();
+    count_changes();
+  }
+  bool may_be_bell(std::size_t column) const {
+    const Outline& o = outline_;
+    const float low = o.low[column], high = o.high[column];
+    const auto frames = static_cast<float>(seen_.size()) / static_cast<float>(columns_);
+    // Three quarters of the samples are not below the lower quartile, which is the background's level.
+    const float most_background = low + 4 / 3.0F * (o.sum[column] / frames - low);
+    const float half = 0.5F * (high + most_background) + slack;
+    const bool is_complete = o.low_before[column] <= half && o.low_after[column] <= half;
+    return is_complete && high - low > 5 - slack && small_changes_[column] > 0.5F * (frames - 2);
+  }
+
+ private:
+  static constexpr float slack = 1e-3F;  // [gray values] for rounding
+  struct Outline {
+    std::vector<float> low, high, low_before, low_after, sum;  ///< before and after the highest sample
+  };
+
+  void gather(const Image<float>& samples, int step, float ceiling) {
+    seen_.clear();
+    for (int i = 0; i < samples.height(); ++i) {
+      if (std::isnan(samples(0, i))) continue;
+      for (int x = 0; x < samples.width(); x += step) seen_.push_back(std::min(samples(x, i), ceiling));
+    }
+  }
+
+  void outline() {
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    Outline& o = outline_;
+    for (auto* values : {&o.low, &o.low_before, &o.low_after}) values->assign(columns_, infinity);
+    o.high.assign(columns_, -infinity);
+    o.sum.assign(columns_, 0);
+    for (std::size_t row = 0; row < seen_.size(); row += columns_)
+      for (std::size_t x = 0; x < columns_; ++x) {
+        const float gray = seen_[row + x];
+        const bool is_higher = gray > o.high[x];
+        o.low_before[x] = is_higher ? o.low[x] : o.low_before[x];
+        const float after = gray < o.low_after[x] ? gray : o.low_after[x];
+        o.low_after[x] = is_higher ? infinity : after;
+        o.high[x] = is_higher ? gray : o.high[x];
+        o.low[x] = gray < o.low[x] ? gray : o.low[x];
+        o.sum[x] += gray;
+      }
+  }
+
+  /// How many changes from frame to frame are small enough for the bell to stand out, were they the median one.
+  void count_changes() {
+    small_changes_.assign(columns_, 0);
+    for (std::size_t row = columns_; row < seen_.size(); row += columns_)
+      for (std::size_t x = 0; x < columns_; ++x) {
+        const float change = std::abs(seen_[row + x] - seen_[row - columns_ + x]);
+        small_changes_[x] += change <= 0.1F * (outline_.high[x] - outline_.low[x]) + slack ? 1.0F : 0.0F;
+      }
+  }
+
+  std::size_t columns_ = 0;
+  std::vector<float> seen_;  ///< a row a frame that is there
+  Outline outline_;
+  std::vector<float> small_changes_;
+};
+
 /// Fills in what an outline shows without a profile. \return whether a complete bell clearly above the noise is there
 bool examine(Pupil& pupil, std::span<const float> outline, double ceiling) {
-  std::vector<double> present, changes;
+  thread_local std::vector<double> present, changes;  // used again: there are many pupils
+  present.clear();
+  changes.clear();
   int peak = -1;
   for (int i = 0; i < static_cast<int>(outline.size()); ++i) {
     const float gray = outline[static_cast<std::size_t>(i)];
@@ -82,7 +155,9 @@ bool examine(Pupil& pupil, std::span<const float> outline, double ceiling) {
   std::nth_element(present.begin(), quarter, present.end());
   pupil.bell.background = *quarter;
   pupil.bell.amplitude = high - pupil.bell.background;
-  const double noise = std::max(median(changes), 0.5);
+  const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
+  std::nth_element(changes.begin(), middle, changes.end());
+  const double noise = std::max(*middle, 0.5);
   pupil.clipped = std::isinf(outline[static_cast<std::size_t>(peak)]);
   if (pupil.bell.amplitude < 10 * noise) return false;
   const auto half = static_cast<float>(pupil.bell.background + 0.5 * pupil.bell.amplitude);
@@ -95,6 +170,7 @@ bool examine(Pupil& pupil, std::span<const float> outline, double ceiling) {
 /// A bell's outline: of clipped samples, only those of the shortest exposure. A longer one was clipped at a level above
 /// which that one still sees.
 std::vector<float> outline_of(std::vector<float> gray, const FrameNoise& noise) {
+  if (noise.mean_weight() == 1) return gray;
   for (int i = 0; i < static_cast<int>(gray.size()); ++i)
     if (float& sample = gray[static_cast<std::size_t>(i)];
         std::isinf(sample) && noise.at(i).ceiling < noise.highest_ceiling())
@@ -111,9 +187,14 @@ std::vector<Pupil> find_pupils(const Frames& frames, int end, const FrameNoise& 
   parallel_rows(rows, [&](int r) {
     Image<float> samples(frames.width(), end);
     frames.read_row(r * row_step, 0, samples);
+    const bool is_of_one_exposure = noise.mean_weight() == 1;
+    Glance glance;
+    if (is_of_one_exposure) glance.look(samples, column_step, static_cast<float>(noise.highest_ceiling()));
     for (int x = 0; x < frames.width(); x += column_step) {
+      if (is_of_one_exposure && !glance.may_be_bell(static_cast<std::size_t>(x / column_step))) continue;
       Pupil pupil;
       pupil.camera = camera;
+      pupil.gray.reserve(static_cast<std::size_t>(end));
       for (int i = 0; i < end; ++i) {
         pupil.gray.push_back(samples(x, i));
         if (!frames.is_even()) pupil.late.push_back(frames.late(i));
@@ -210,6 +291,9 @@ class Teacher {
   LearnedStripe run() {
     const int iterations = number_of_iterations();
     for (int iteration = 0; iteration < iterations; ++iteration) {
+      // What comes out of the first rounds is where the last two start: a part of the pupils will do.
+      const bool is_rough = iterations == usual_iterations && iteration + 2 < iterations;
+      step_ = is_rough ? std::max<std::size_t>(1, pupils_.size() / enough_for_a_start) : 1;
       align(iteration);
       average(iteration + 2 >= iterations);
       if (iteration > 0) learn_noise();
@@ -225,7 +309,7 @@ class Teacher {
     // 8 rounds errors of 1.2 bounds are left, after 20 none).
     const bool differ = std::ranges::any_of(noise_, [](const FrameNoise& noise) { return noise.mean_weight() < 1; });
     if (differ) return 20;
-    return only_flanks_ ? 8 : 5;
+    return only_flanks_ ? 8 : usual_iterations;
   }
 
   void align(int iteration) {
@@ -237,7 +321,9 @@ class Teacher {
                                 .most_iterations = 20};
     parallel_ranges(static_cast<int>(pupils_.size()), 64, [&](int begin, int end) {
       for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
-        Bell start = iteration == 0 ? pupils_[i].bell : fits_[i].bell;
+        if (i % step_ != 0) continue;
+        const bool is_first = fits_[i].samples == 0;
+        Bell start = is_first ? pupils_[i].bell : fits_[i].bell;
         start.width = 1;
         BellFitOptions options = common;
         options.late = pupils_[i].late;
@@ -272,9 +358,12 @@ class Teacher {
       if (!fits_[i].converged || misfit(fits_[i]) > limit) continue;
       scatter(pupils_[i], fits_[i].bell, begin, bin_length, bins);
     }
-    std::vector<StripeProfile::Point> points;
-    for (auto& bin : bins)
-      if (!bin.empty()) points.push_back(robust_mean(bin));
+    std::erase_if(bins, [](const auto& bin) { return bin.empty(); });
+    std::vector<StripeProfile::Point> points(bins.size());
+    parallel_ranges(static_cast<int>(bins.size()), 16, [&](int first, int last) {
+      for (auto k = static_cast<std::size_t>(first); k < static_cast<std::size_t>(last); ++k)
+        points[k] = robust_mean(bins[k]);
+    });
     if (!final_support) remove_baseline(points);
     learned_.profile = StripeProfile::fit(points, begin, end, spacing);
   }
@@ -348,17 +437,18 @@ class Teacher {
   }
 
   void learn_noise() {
-    for (std::size_t camera = 0; camera < noise_.size(); ++camera) {
+    const double limit = usual_misfit() * 2;
+    parallel_rows(static_cast<int>(noise_.size()), [&](int c) {
+      const auto camera = static_cast<std::size_t>(c);
       std::vector<NoiseSample> samples;
-      const double limit = usual_misfit() * 2;
       for (std::size_t i = 0; i < pupils_.size(); ++i)
         if (pupils_[i].camera == camera && fits_[i].converged && misfit(fits_[i]) <= limit)
           collect_noise(pupils_[i], fits_[i], samples);
-      if (samples.empty()) continue;
+      if (samples.empty()) return;
       SensorNoise noise = fit_sensor_noise(samples);
       noise.ceiling = noise_[camera].sensor().ceiling;
       noise_[camera] = noise_[camera].with(noise);
-    }
+    });
   }
 
   /// As the sensor had them, whatever their exposure.
@@ -379,13 +469,16 @@ class Teacher {
   }
 
   static constexpr double negligible = 0.003;
+  static constexpr int usual_iterations = 5;
+  static constexpr std::size_t enough_for_a_start = 600;
 
   std::vector<Pupil> pupils_;
   std::vector<FrameNoise> noise_;  ///< one a camera
   std::vector<BellFit> fits_;
   LearnedStripe learned_;
-  double fwhm_ = 0;   ///< [frames]
-  double reach_ = 0;  ///< [frames] before and after the middle within which the profile is looked for
+  std::size_t step_ = 1;  ///< one pupil in so many takes part
+  double fwhm_ = 0;       ///< [frames]
+  double reach_ = 0;      ///< [frames] before and after the middle within which the profile is looked for
   bool only_flanks_ = false;
 };
 

@@ -60,6 +60,17 @@ SensorNoise fit_line(std::span<const Level> levels) {
   return noise;
 }
 
+/// Brings samples into an order in which the bins that `borders` part follow one another by gray value.
+void sort_into_bins(std::span<NoiseSample> samples, std::span<const std::size_t> borders, std::size_t first = 0) {
+  if (borders.empty()) return;
+  const std::size_t half = borders.size() / 2, border = borders[half] - first;
+  const auto middle = samples.begin() + static_cast<std::ptrdiff_t>(border);
+  std::nth_element(samples.begin(), middle, samples.end(),
+                   [](const NoiseSample& a, const NoiseSample& b) { return a.gray < b.gray; });
+  sort_into_bins(samples.first(border), borders.first(half), first);
+  sort_into_bins(samples.subspan(border), borders.subspan(half + 1), first + border);
+}
+
 }  // namespace
 
 FrameNoise::FrameNoise(const SensorNoise& sensor, std::vector<double> exposures)
@@ -77,8 +88,10 @@ SensorNoise fit_sensor_noise(std::span<const NoiseSample> samples) {
   constexpr std::size_t fewest = 50, most_bins = 24;
   if (samples.size() < fewest) return {};
   std::vector<NoiseSample> sorted(samples.begin(), samples.end());
-  std::sort(sorted.begin(), sorted.end(), [](const NoiseSample& a, const NoiseSample& b) { return a.gray < b.gray; });
   const std::size_t bins = std::min(most_bins, sorted.size() / (fewest / 2));
+  std::vector<std::size_t> borders;
+  for (std::size_t i = 1; i < bins; ++i) borders.push_back(i * sorted.size() / bins);
+  sort_into_bins(sorted, borders);
   std::vector<Level> levels;
   for (std::size_t i = 0; i < bins; ++i) {
     const std::size_t begin = i * sorted.size() / bins, end = (i + 1) * sorted.size() / bins;
