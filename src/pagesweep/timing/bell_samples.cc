@@ -18,13 +18,18 @@ BellReader::BellReader(const StripeWindows& windows, const PlainBells& bells, do
       light_(static_cast<std::size_t>(most_bells * windows.length() + most_bells)) {}
 
 BellSamples BellReader::read(int x, int y, float log_width, int slot) {
+  return windows_.is_8_bit() ? read(windows_.gray<std::uint8_t>(x, y), x, y, log_width, slot)
+                             : read(windows_.gray<std::uint16_t>(x, y), x, y, log_width, slot);
+}
+
+template <class T>
+BellSamples BellReader::read(const T* gray, int x, int y, float log_width, int slot) {
   const Sequence& sequence = windows_.sequence();
   const auto black = static_cast<float>(sequence.black_level), saturation = static_cast<float>(sequence.saturation);
   const auto length = static_cast<std::size_t>(windows_.length());
   float* light = &light_[static_cast<std::size_t>(slot) * length];
   BellSamples samples{windows_.centre(x, y), log_width, &bells_.table(log_width), light};
-  const float most = windows_.is_8_bit() ? take_off(windows_.gray<std::uint8_t>(x, y), length, black, light)
-                                         : take_off(windows_.gray<std::uint16_t>(x, y), length, black, light);
+  const float most = take_off(gray, length, black, light);
   samples.kind = most >= saturation && is_clipped(samples) ? BellSamples::Kind::clipped : kind_of(samples);
   return samples;
 }

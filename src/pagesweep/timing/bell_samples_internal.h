@@ -38,6 +38,8 @@ class BellReader {
   void add_to(PlainBells& bells, const BellSamples& samples) const;
 
  private:
+  template <class T>
+  BellSamples read(const T* gray, int x, int y, float log_width, int slot);
   BellSamples::Kind kind_of(const BellSamples& samples) const;
   bool is_clipped(const BellSamples& samples) const;
 

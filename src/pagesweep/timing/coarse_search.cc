@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <vector>
 
 #include "pagesweep/data/time_map.h"
 #include "pagesweep/timing/row_kernels_internal.h"
@@ -61,16 +62,18 @@ void CoarseSearch::look(const Step& step, const RawRow& rows, int first_frame, i
   const auto at = static_cast<std::size_t>(left);
   const HighestRow highest{&rise_.row(y)[at], &before_.row(y)[at], &after_.row(y)[at], &last_.row(y)[at],
                            &best_.row(y)[at]};
+  std::vector<Place> places;
   for (int k = step.first_place; k < step.end_place; ++k) {
     const bool has_left = k >= blocks_before, has_right = k + blocks_after < step.end_block;
     if (!has_left && !has_right) continue;
     // Where one side is missing, the other stands for both.
     const int left_side = has_left ? k - 3 : k + 3, right_side = has_right ? k + 3 : k - 3;
     const auto block = [&](int i) { return sums.row(i - step.first_block).data(); };
-    keep_highest(
-        {{block(k), block(k + 1)}, {block(left_side), block(left_side + 1), block(right_side), block(right_side + 1)}},
-        k, highest, static_cast<std::size_t>(columns));
+    places.push_back({{block(k), block(k + 1)},
+                      {block(left_side), block(left_side + 1), block(right_side), block(right_side + 1)},
+                      k});
   }
+  keep_highest(places, highest, static_cast<std::size_t>(columns));
 }
 
 int CoarseSearch::frame(int x, int y, int frame_count) const {

@@ -187,10 +187,14 @@ std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double w
       return PixelTime{.amplitude = fit.amplitude, .bell_time = fit.time, .status = PixelStatus::truncated};
     return std::nullopt;
   }
-  const double chi_square = fit.chi_square / std::max(1, fit.samples - 3), limit = noise_limit(fit.samples);
-  if (judge.refuse_misfits && chi_square > limit) return std::nullopt;
+  const double chi_square = fit.chi_square / std::max(1, fit.samples - 3);
+  double sigma = fit.time_sigma;
+  if (chi_square > 1)
+    if (const double limit = noise_limit(fit.samples); chi_square > limit) {
+      if (judge.refuse_misfits) return std::nullopt;
+      sigma *= std::sqrt(chi_square / limit);
+    }
   const Bell bell{fit.amplitude, fit.background, fit.time, width};
-  const double sigma = std::sqrt(std::max(1.0, chi_square / limit)) * fit.time_sigma;
   const bool dark = is_lost_in_noise(bell, judge) || is_too_faint(bell, sigma, judge);
   return PixelTime{.time = fit.time,
                    .sigma = sigma,

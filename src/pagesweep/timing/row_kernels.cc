@@ -45,65 +45,69 @@ void SumRows(Rows<T> rows, int left, float factor, std::span<float> sums) {
 }
 
 template <class T>
-void CountClipped(Rows<T> rows, T saturation, std::span<std::uint8_t> counts) {
+void CountClipped(Rows<T> all_rows, T saturation, std::span<std::uint8_t> counts) {
+  constexpr std::size_t rows_at_once = 8;  // long pieces of few rows are read faster than short ones of many
   const hn::ScalableTag<T> d;
   const auto lanes = hn::Lanes(d);
   const auto limit = hn::Set(d, saturation), one = hn::Set(d, T{1});
   HWY_ALIGN T clipped[hn::MaxLanes(d)];
-  std::size_t x = 0;
   const auto add = [&](std::size_t at, unsigned many) {
     counts[at] = static_cast<std::uint8_t>(std::min(255U, counts[at] + many));
   };
-  for (; x + lanes <= counts.size(); x += lanes) {
-    auto count = hn::Zero(d);
-    for (const T* row : rows) {
+  for (std::size_t first = 0; first < all_rows.size(); first += rows_at_once) {
+    const Rows<T> rows = all_rows.subspan(first, std::min(rows_at_once, all_rows.size() - first));
+    std::size_t x = 0;
+    for (; x + lanes <= counts.size(); x += lanes) {
+      auto highest = hn::Zero(d);
+      for (const T* row : rows) highest = hn::Max(highest, hn::LoadU(d, row + x));
       // Unsigned a >= b where the larger of the two is a.
-      const auto gray = hn::LoadU(d, row + x);
-      count = hn::SaturatedAdd(count, hn::IfThenElseZero(hn::Eq(hn::Max(gray, limit), gray), one));
+      if (hn::AllFalse(d, hn::Eq(hn::Max(highest, limit), highest))) continue;
+      auto count = hn::Zero(d);
+      for (const T* row : rows) {
+        const auto gray = hn::LoadU(d, row + x);
+        count = hn::Add(count, hn::IfThenElseZero(hn::Eq(hn::Max(gray, limit), gray), one));
+      }
+      hn::Store(count, d, clipped);
+      for (std::size_t k = 0; k < lanes; ++k) add(x + k, clipped[k]);
     }
-    if (hn::AllTrue(d, hn::Eq(count, hn::Zero(d)))) continue;
-    hn::Store(count, d, clipped);
-    for (std::size_t k = 0; k < lanes; ++k) add(x + k, clipped[k]);
+    for (; x < counts.size(); ++x)
+      for (const T* row : rows) add(x, row[x] >= saturation);
   }
-  for (; x < counts.size(); ++x)
-    for (const T* row : rows) add(x, row[x] >= saturation);
 }
 
-void KeepHighest(const BlockRows& rows, std::int32_t place, const HighestRow& highest, std::size_t count) {
-  const Floats d;
-  const hn::RebindToSigned<Floats> integers;
-  const auto& [middle, side] = rows;
-  std::size_t x = 0;
-  for (; x + hn::Lanes(d) <= count; x += hn::Lanes(d)) {
-    const auto at = [x](const float* row) { return hn::LoadU(Floats(), row + x); };
-    const Vector sides = hn::Add(hn::Add(at(side[0]), at(side[1])), hn::Add(at(side[2]), at(side[3])));
-    const Vector light = hn::Add(at(middle[0]), at(middle[1])), response = hn::Sub(hn::Add(light, light), sides);
-    const Vector rise = at(highest.rise), last = at(highest.last);
-    const auto bests = hn::LoadU(integers, highest.best + x);
+template <class D>
+void keep_highest_of(D d, std::span<const Place> places, const HighestRow& row, std::size_t x) {
+  const hn::RebindToSigned<D> integers;
+  auto rise = hn::LoadU(d, row.rise + x), before = hn::LoadU(d, row.before + x), after = hn::LoadU(d, row.after + x);
+  auto last = hn::LoadU(d, row.last + x);
+  auto best = hn::LoadU(integers, row.best + x);
+  for (const Place& place : places) {
+    const auto at = [d, x](const float* sums) { return hn::LoadU(d, sums + x); };
+    const auto& [middle, side, number] = place;
+    const auto sides = hn::Add(hn::Add(at(side[0]), at(side[1])), hn::Add(at(side[2]), at(side[3])));
+    const auto light = hn::Add(at(middle[0]), at(middle[1])), response = hn::Sub(hn::Add(light, light), sides);
     const auto higher = hn::Gt(response, rise);
-    const auto follows = hn::RebindMask(d, hn::Eq(bests, hn::Set(integers, place - 1)));
-    const Vector after = hn::IfThenElse(follows, response, at(highest.after));
-    hn::StoreU(hn::IfThenElse(higher, response, rise), d, highest.rise + x);
-    hn::StoreU(hn::IfThenElse(higher, last, at(highest.before)), d, highest.before + x);
-    hn::StoreU(hn::IfThenElse(higher, hn::Set(d, std::numeric_limits<float>::quiet_NaN()), after), d,
-               highest.after + x);
-    hn::StoreU(response, d, highest.last + x);
-    hn::StoreU(hn::IfThenElse(hn::RebindMask(integers, higher), hn::Set(integers, place), bests), integers,
-               highest.best + x);
+    const auto follows = hn::RebindMask(d, hn::Eq(best, hn::Set(integers, number - 1)));
+    after = hn::IfThenElse(follows, response, after);
+    after = hn::IfThenElse(higher, hn::Set(d, std::numeric_limits<float>::quiet_NaN()), after);
+    before = hn::IfThenElse(higher, last, before);
+    rise = hn::IfThenElse(higher, response, rise);
+    best = hn::IfThenElse(hn::RebindMask(integers, higher), hn::Set(integers, number), best);
+    last = response;
   }
-  for (; x < count; ++x) {
-    const float sides = (side[0][x] + side[1][x]) + (side[2][x] + side[3][x]), light = middle[0][x] + middle[1][x];
-    const float response = light + light - sides;
-    if (response > highest.rise[x]) {
-      highest.rise[x] = response;
-      highest.before[x] = highest.last[x];
-      highest.after[x] = std::numeric_limits<float>::quiet_NaN();
-      highest.best[x] = place;
-    } else if (highest.best[x] == place - 1) {
-      highest.after[x] = response;
-    }
-    highest.last[x] = response;
-  }
+  hn::StoreU(rise, d, row.rise + x);
+  hn::StoreU(before, d, row.before + x);
+  hn::StoreU(after, d, row.after + x);
+  hn::StoreU(last, d, row.last + x);
+  hn::StoreU(best, integers, row.best + x);
+}
+
+void KeepHighest(std::span<const Place> places, const HighestRow& row, std::size_t count) {
+  const Floats d;
+  const hn::CappedTag<float, 1> single;
+  std::size_t x = 0;
+  for (; x + hn::Lanes(d) <= count; x += hn::Lanes(d)) keep_highest_of(d, places, row, x);
+  for (; x < count; ++x) keep_highest_of(single, places, row, x);
 }
 
 /// As many vectors as they have lanes become the vectors of their first, second, ... lanes: each pass turns the
@@ -222,8 +226,8 @@ void count_clipped_rows(std::span<const std::uint16_t* const> rows, std::uint16_
   HWY_DYNAMIC_DISPATCH(CountClipped16)(rows, saturation, counts);
 }
 
-void keep_highest(const BlockRows& rows, std::int32_t place, const HighestRow& highest, std::size_t count) {
-  HWY_DYNAMIC_DISPATCH(KeepHighest)(rows, place, highest, count);
+void keep_highest(std::span<const Place> places, const HighestRow& highest, std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(KeepHighest)(places, highest, count);
 }
 
 void transpose_rows(std::span<const std::uint8_t* const> rows, int left, std::uint8_t* out, std::size_t stride) {

@@ -12,10 +12,12 @@ namespace pagesweep {
 void sum_rows(std::span<const std::uint8_t* const> rows, int left, float factor, std::span<float> sums);
 void sum_rows(std::span<const std::uint16_t* const> rows, int left, float factor, std::span<float> sums);
 
-/// Sums of blocks of frames, a row each: a response is twice the middle less the sides.
-struct BlockRows {
+/// A place in the sequences and the sums of blocks of frames around it, a row each. The response there is twice the
+/// middle less the sides.
+struct Place {
   const float* middle[2];
   const float* side[4];
+  std::int32_t number;
 };
 /// The highest response so far of each pixel in a row, and those beside it. NaN: there is none.
 struct HighestRow {
@@ -25,8 +27,8 @@ struct HighestRow {
   float* last;         ///< of the place looked at last
   std::int32_t* best;  ///< place of the highest
 };
-/// Looks at the next place of `count` pixels. The first of equal responses is the highest.
-void keep_highest(const BlockRows& rows, std::int32_t place, const HighestRow& highest, std::size_t count);
+/// Looks at the next places of `count` pixels. The first of equal responses is the highest.
+void keep_highest(std::span<const Place> places, const HighestRow& highest, std::size_t count);
 
 /// Adds to counts[x] in how many rows row[x] >= saturation, up to 255.
 void count_clipped_rows(std::span<const std::uint8_t* const> rows, std::uint8_t saturation,

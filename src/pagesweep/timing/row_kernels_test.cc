@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "pagesweep/timing/row_kernels_internal.h"
@@ -107,12 +108,12 @@ TEST(KeepHighest, RemembersTheHighestAndThoseBesideIt) {
       blocks.back().push_back(
           std::round(20 * static_cast<float>(testing::uniform(9, 100 * x + static_cast<std::size_t>(k)))));
   }
-  const auto rows_at = [&](int k) {
+  const auto place_at = [&](int k) {
     const auto row = [&](int i) { return blocks[static_cast<std::size_t>(i)].data(); };
-    return BlockRows{{row(k), row(k + 1)}, {row(k + 2), row(k + 3), row(k + 4), row(k + 5)}};
+    return Place{{row(k), row(k + 1)}, {row(k + 2), row(k + 3), row(k + 4), row(k + 5)}, k};
   };
   const auto response = [&](int k, std::size_t x) {
-    const BlockRows rows = rows_at(k);
+    const Place rows = place_at(k);
     return 2 * (rows.middle[0][x] + rows.middle[1][x]) -
            ((rows.side[0][x] + rows.side[1][x]) + (rows.side[2][x] + rows.side[3][x]));
   };
@@ -122,8 +123,11 @@ TEST(KeepHighest, RemembersTheHighestAndThoseBesideIt) {
     std::vector<float> rise(count, -std::numeric_limits<float>::infinity());
     std::vector<float> before(count, nan), after(count, nan), last(count, nan);
     std::vector<std::int32_t> best(count, -1);
-    for (int k = 0; k < places; ++k)
-      keep_highest(rows_at(k), k, {rise.data(), before.data(), after.data(), last.data(), best.data()}, count);
+    for (const auto& [begin, end] : {std::pair{0, 4}, std::pair{4, 5}, std::pair{5, places}}) {
+      std::vector<Place> step;
+      for (int k = begin; k < end; ++k) step.push_back(place_at(k));
+      keep_highest(step, {rise.data(), before.data(), after.data(), last.data(), best.data()}, count);
+    }
     for (std::size_t x = 0; x < count; ++x) {
       int highest = 0;
       for (int k = 1; k < places; ++k)

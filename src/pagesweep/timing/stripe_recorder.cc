@@ -14,7 +14,7 @@
 namespace pagesweep {
 namespace {
 
-constexpr int columns_at_once = 256;  // whose sums stay in the cache
+constexpr int columns_at_once = 128;  // whose sums stay in the cache
 constexpr int most_apart = 32;        // [frames] between the bells of pixels that are cut out together
 /// Half a sigma less than a bell needs to be told from noise: between two blocks the response is that much lower.
 constexpr float least_significance = 3;
@@ -30,6 +30,18 @@ void count_clipped(const Frames& frames, int begin, int end, int y, std::span<st
   for (int i = begin; i < end; ++i)
     if (frames.has(i)) rows.push_back(std::get<Image<T>>(frames.frame(i)).row(y).data());
   count_clipped_rows(rows, static_cast<T>(saturation), counts);
+}
+
+/// The rows of frames first ... end - 1, of which `all` are those from `begin` on. Where there is none, the nearest
+/// one.
+template <class T>
+std::span<const T* const> rows_around(const RowsOf<T>& all, int begin, int first, int end, RowsOf<T>& copy) {
+  const int count = static_cast<int>(all.size());
+  if (first >= begin && end <= begin + count)
+    return std::span(all).subspan(static_cast<std::size_t>(first - begin), static_cast<std::size_t>(end - first));
+  copy.clear();
+  for (int i = first; i < end; ++i) copy.push_back(all[static_cast<std::size_t>(std::clamp(i - begin, 0, count - 1))]);
+  return copy;
 }
 
 }  // namespace
@@ -156,15 +168,14 @@ void StripeRecorder::cut(const Step& step, const RowsOf<T>& rows, int y, int lef
   const int tile_left = std::min(left, windows_.sequence().width - tile_pixels), half = windows_.half();
   T* const tile = reinterpret_cast<T*>(scratch.tile.data());
   std::vector<Scratch::Ready>& ready = scratch.ready;
+  RowsOf<T> copy;
   while (!ready.empty()) {
     const int first = std::ranges::min(ready, {}, &Scratch::Ready::centre).centre;
     const auto is_near = [first](const Scratch::Ready& pixel) { return pixel.centre <= first + most_apart; };
     int last = first;
     for (const auto& pixel : ready)
       if (is_near(pixel)) last = std::max(last, pixel.centre);
-    RowsOf<T> around;
-    for (int i = first - half; i <= last + half; ++i)
-      around.push_back(rows[static_cast<std::size_t>(std::clamp(i, step.begin, step.end - 1) - step.begin)]);
+    const auto around = rows_around(rows, step.begin, first - half, last + half + 1, copy);
     const std::size_t stride = (around.size() + tile_pixels - 1) / tile_pixels * tile_pixels;
     transpose_rows(around, tile_left, tile, stride);
     for (const auto& pixel : ready)

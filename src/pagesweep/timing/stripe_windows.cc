@@ -15,10 +15,9 @@ StripeWindows::StripeWindows(const Sequence& sequence, int half)
       margin_(2 * half + 1 + most_bells),
       centre_(sequence.width, sequence.height, none),
       significance_(sequence.width, sequence.height) {
-  if (sequence.is_8_bit())
-    gray_ = Image<std::uint8_t>(sequence.width * length(), sequence.height);
-  else
-    gray_ = Image<std::uint16_t>(sequence.width * length(), sequence.height);
+  const std::size_t samples = first_sample(0, sequence.height);
+  // Whoever writes a window first gets the memory for it, on all threads.
+  gray_ = std::make_unique_for_overwrite<std::byte[]>(samples * (sequence.is_8_bit() ? 1 : 2));
   set_frames({}, {});
 }
 

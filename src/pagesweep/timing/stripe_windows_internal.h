@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <variant>
 #include <vector>
 
 #include "pagesweep/base/image.h"
@@ -32,9 +33,9 @@ class StripeWindows {
   /// there was no frame stands a neighbouring one's.
   template <class T>
   const T* gray(int x, int y) const {
-    return std::get<Image<T>>(gray_).row(y).data() + static_cast<std::ptrdiff_t>(x) * length();
+    return reinterpret_cast<const T*>(gray_.get()) + first_sample(x, y);
   }
-  bool is_8_bit() const { return gray_.index() == 0; }
+  bool is_8_bit() const { return sequence_.is_8_bit(); }
 
   /// For frame `first` and those after it 1, or 0 where there is none. \pre first >= -half()
   const float* present(int first) const { return &present_[static_cast<std::size_t>(first + margin_)]; }
@@ -63,14 +64,20 @@ class StripeWindows {
   }
   template <class T>
   T* gray(int x, int y) {
-    return std::get<Image<T>>(gray_).row(y).data() + static_cast<std::ptrdiff_t>(x) * length();
+    return reinterpret_cast<T*>(gray_.get()) + first_sample(x, y);
   }
 
  private:
+  std::size_t first_sample(int x, int y) const {
+    const auto pixel =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(sequence_.width) + static_cast<std::size_t>(x);
+    return pixel * static_cast<std::size_t>(length());
+  }
+
   Sequence sequence_;
   int half_ = 0;
-  int margin_ = 0;  ///< [frames] before the first and after the last
-  std::variant<Image<std::uint8_t>, Image<std::uint16_t>> gray_;
+  int margin_ = 0;                     ///< [frames] before the first and after the last
+  std::unique_ptr<std::byte[]> gray_;  ///< of either depth; nothing where no stripe passed, not even memory
   Image<std::int32_t> centre_;
   Image<float> significance_;
   std::vector<float> present_;
