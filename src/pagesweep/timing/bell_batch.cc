@@ -22,12 +22,18 @@ using Vector = hn::Vec<Floats>;
 using Mask = hn::Mask<Floats>;
 using Each = BellBatch::Each<float>;
 
-/// Partial sums of `Count` quantities for every bell, a vector each, and their totals.
+/// Partial sums of `Count` quantities for every bell, half a vector each, and their totals.
 template <int Count>
 class Sums {
  public:
   void put(int bell, const Vector (&sums)[Count]) {
-    for (int s = 0; s < Count; ++s) hn::Store(sums[s], Floats(), row(s, bell));
+#if HWY_TARGET == HWY_SCALAR
+    for (int s = 0; s < Count; ++s) partial_[s * most_bells + bell] = hn::GetLane(sums[s]);
+#else
+    const hn::Half<Floats> half;
+    for (int s = 0; s < Count; ++s)
+      hn::StoreU(hn::Add(hn::LowerHalf(half, sums[s]), hn::UpperHalf(half, sums[s])), half, row(s, bell));
+#endif
   }
   /// Of quantity s, for every bell.
   void total(int s, Each& totals) {
@@ -37,15 +43,16 @@ class Sums {
   }
 
  private:
-  float* row(int s, int bell) { return partial_ + (s * most_bells + bell) * static_cast<int>(hn::Lanes(Floats())); }
+  static int row_length() { return std::max(1, static_cast<int>(hn::Lanes(Floats())) / 2); }
+  float* row(int s, int bell) { return partial_ + (s * most_bells + bell) * row_length(); }
 
-  /// Sums of as many vectors as they have lanes, one a lane. Each pass halves their number.
+  /// Sums of as many rows as vectors have lanes, one a lane. Each pass adds neighbours, and halves their number.
   static Vector total_of(float* rows, int lanes) {
     const Floats d;
 #if HWY_TARGET == HWY_SCALAR
     (void)lanes;
 #else
-    for (int left = lanes; left > 1; left /= 2)
+    for (int left = lanes / 2; left > 1; left /= 2)
       for (int k = 0; k < left / 2; ++k) {
         const Vector a = hn::Load(d, rows + 2 * k * lanes), b = hn::Load(d, rows + (2 * k + 1) * lanes);
         hn::Store(hn::Add(hn::ConcatEven(d, b, a), hn::ConcatOdd(d, b, a)), d, rows + k * lanes);
@@ -54,7 +61,7 @@ class Sums {
     return hn::Load(d, rows);
   }
 
-  HWY_ALIGN float partial_[Count * most_bells * most_bells];
+  HWY_ALIGN float partial_[Count * most_bells * most_bells / 2];
 };
 
 /// Where the bells lie in their tables and their samples.

@@ -17,21 +17,23 @@ BellReader::BellReader(const StripeWindows& windows, const PlainBells& bells, do
       // What follows a pixel's samples is another's, or 0.
       light_(static_cast<std::size_t>(most_bells * windows.length() + most_bells)) {}
 
-BellSamples BellReader::read(int x, int y, float log_width, int slot) {
-  return windows_.is_8_bit() ? read(windows_.gray<std::uint8_t>(x, y), x, y, log_width, slot)
-                             : read(windows_.gray<std::uint16_t>(x, y), x, y, log_width, slot);
+void BellReader::read(int x, int y, float log_width, int slot, BellSamples& samples) {
+  windows_.is_8_bit() ? read(windows_.gray<std::uint8_t>(x, y), windows_.centre(x, y), log_width, slot, samples)
+                      : read(windows_.gray<std::uint16_t>(x, y), windows_.centre(x, y), log_width, slot, samples);
 }
 
 template <class T>
-BellSamples BellReader::read(const T* gray, int x, int y, float log_width, int slot) {
+void BellReader::read(const T* gray, int centre, float log_width, int slot, BellSamples& samples) {
   const Sequence& sequence = windows_.sequence();
   const auto black = static_cast<float>(sequence.black_level), saturation = static_cast<float>(sequence.saturation);
   const auto length = static_cast<std::size_t>(windows_.length());
   float* light = &light_[static_cast<std::size_t>(slot) * length];
-  BellSamples samples{windows_.centre(x, y), log_width, &bells_.table(log_width), light};
+  samples.centre = centre;
+  samples.log_width = log_width;
+  samples.table = &bells_.table(log_width);
+  samples.light = light;
   const float most = take_off(gray, length, black, light);
   samples.kind = most >= saturation && is_clipped(samples) ? BellSamples::Kind::clipped : kind_of(samples);
-  return samples;
 }
 
 bool BellReader::is_clipped(const BellSamples& samples) const {

@@ -33,13 +33,13 @@ class BellReader {
 
   /// \param slot  0 ... most_bells - 1: what was read there before is gone
   /// \pre the stripe passed the pixel
-  BellSamples read(int x, int y, float log_width, int slot);
+  void read(int x, int y, float log_width, int slot, BellSamples& samples);
   /// Puts them with the others of their kind.
   void add_to(PlainBells& bells, const BellSamples& samples) const;
 
  private:
   template <class T>
-  BellSamples read(const T* gray, int x, int y, float log_width, int slot);
+  void read(const T* gray, int centre, float log_width, int slot, BellSamples& samples);
   BellSamples::Kind kind_of(const BellSamples& samples) const;
   bool is_clipped(const BellSamples& samples) const;
 

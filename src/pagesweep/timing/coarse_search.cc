@@ -42,26 +42,23 @@ CoarseSearch::Step CoarseSearch::next_step(int done, int frame_count, bool ended
 }
 
 template <class T>
-void CoarseSearch::sum_blocks(const Step& step, const RowsOf<T>& rows, int first_frame, int left,
-                              Image<float>& sums) const {
+void CoarseSearch::sum_blocks(const Step& step, const RowsOf<T>& rows, int first_frame, Image<float>& sums) const {
   for (int k = step.first_block; k < step.end_block; ++k) {
     const int begin = k * block_, count = std::min(block_, step.frame_count - begin);
     const auto frames =
         std::span(rows).subspan(static_cast<std::size_t>(begin - first_frame), static_cast<std::size_t>(count));
     // A block that the recording's end has cut counts as a whole one.
-    sum_rows(frames, left, static_cast<float>(block_) / static_cast<float>(count), sums.row(k - step.first_block));
+    sum_rows(frames, 0, static_cast<float>(block_) / static_cast<float>(count), sums.row(k - step.first_block));
   }
 }
 
-void CoarseSearch::look(const Step& step, const RawRow& rows, int first_frame, int y, int left, int columns,
-                        Image<float>& sums) {
+void CoarseSearch::look(const Step& step, const RawRow& rows, int first_frame, int y, Image<float>& sums) {
   if (step.first_place == step.end_place) return;
-  const int blocks = step.end_block - step.first_block;
+  const int blocks = step.end_block - step.first_block, columns = rise_.width();
   if (sums.width() != columns || sums.height() < blocks) sums = Image<float>(columns, blocks);
-  std::visit([&](const auto& present) { sum_blocks(step, present, first_frame, left, sums); }, rows);
-  const auto at = static_cast<std::size_t>(left);
-  const HighestRow highest{&rise_.row(y)[at], &before_.row(y)[at], &after_.row(y)[at], &last_.row(y)[at],
-                           &best_.row(y)[at]};
+  std::visit([&](const auto& present) { sum_blocks(step, present, first_frame, sums); }, rows);
+  const HighestRow highest{rise_.row(y).data(), before_.row(y).data(), after_.row(y).data(), last_.row(y).data(),
+                           best_.row(y).data()};
   std::vector<Place> places;
   for (int k = step.first_place; k < step.end_place; ++k) {
     const bool has_left = k >= blocks_before, has_right = k + blocks_after < step.end_block;

@@ -32,10 +32,10 @@ class CoarseSearch {
   /// First frame that the step after `done` places needs.
   int first_needed(int done) const { return std::max(0, done - 3) * block_; }
 
-  /// Looks at the pixels left, left + 1, ... of row y.
+  /// Looks at row y.
   /// \param rows         frames from first_frame on
   /// \param sums         scratch memory
-  void look(const Step& step, const RawRow& rows, int first_frame, int y, int left, int columns, Image<float>& sums);
+  void look(const Step& step, const RawRow& rows, int first_frame, int y, Image<float>& sums);
 
   /// Place of the highest response; -1 before the first.
   int best(int x, int y) const { return best_(x, y); }
@@ -46,7 +46,7 @@ class CoarseSearch {
 
  private:
   template <class T>
-  void sum_blocks(const Step& step, const RowsOf<T>& rows, int first_frame, int left, Image<float>& sums) const;
+  void sum_blocks(const Step& step, const RowsOf<T>& rows, int first_frame, Image<float>& sums) const;
 
   int block_;
   float per_sigma_;

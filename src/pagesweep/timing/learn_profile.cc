@@ -291,9 +291,6 @@ class Teacher {
   LearnedStripe run() {
     const int iterations = number_of_iterations();
     for (int iteration = 0; iteration < iterations; ++iteration) {
-      // What comes out of the first rounds is where the last two start: a part of the pupils will do.
-      const bool is_rough = iterations == usual_iterations && iteration + 2 < iterations;
-      step_ = is_rough ? std::max<std::size_t>(1, pupils_.size() / enough_for_a_start) : 1;
       align(iteration);
       average(iteration + 2 >= iterations);
       if (iteration > 0) learn_noise();
@@ -309,7 +306,7 @@ class Teacher {
     // 8 rounds errors of 1.2 bounds are left, after 20 none).
     const bool differ = std::ranges::any_of(noise_, [](const FrameNoise& noise) { return noise.mean_weight() < 1; });
     if (differ) return 20;
-    return only_flanks_ ? 8 : usual_iterations;
+    return only_flanks_ ? 8 : 5;
   }
 
   void align(int iteration) {
@@ -321,9 +318,7 @@ class Teacher {
                                 .most_iterations = 20};
     parallel_ranges(static_cast<int>(pupils_.size()), 64, [&](int begin, int end) {
       for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
-        if (i % step_ != 0) continue;
-        const bool is_first = fits_[i].samples == 0;
-        Bell start = is_first ? pupils_[i].bell : fits_[i].bell;
+        Bell start = iteration == 0 ? pupils_[i].bell : fits_[i].bell;
         start.width = 1;
         BellFitOptions options = common;
         options.late = pupils_[i].late;
@@ -469,16 +464,13 @@ class Teacher {
   }
 
   static constexpr double negligible = 0.003;
-  static constexpr int usual_iterations = 5;
-  static constexpr std::size_t enough_for_a_start = 600;
 
   std::vector<Pupil> pupils_;
   std::vector<FrameNoise> noise_;  ///< one a camera
   std::vector<BellFit> fits_;
   LearnedStripe learned_;
-  std::size_t step_ = 1;  ///< one pupil in so many takes part
-  double fwhm_ = 0;       ///< [frames]
-  double reach_ = 0;      ///< [frames] before and after the middle within which the profile is looked for
+  double fwhm_ = 0;   ///< [frames]
+  double reach_ = 0;  ///< [frames] before and after the middle within which the profile is looked for
   bool only_flanks_ = false;
 };
 

@@ -86,6 +86,12 @@ bool misfits(const PixelWindow& window, const Bell& bell, const PixelJudge& judg
 /// Reduced chi square beyond which noise cannot be the reason any more: four standard deviations.
 double noise_limit(int samples) { return 1 + 4 * std::sqrt(2.0 / std::max(1, samples - 3)); }
 
+/// Whether it exceeds noise_limit(), without a root.
+bool is_beyond_noise(double reduced_chi_square, int samples) {
+  const double excess = reduced_chi_square - 1;
+  return excess * std::abs(excess) * std::max(1, samples - 3) > 4 * 4 * 2;
+}
+
 bool is_lost_in_noise(const Bell& bell, const PixelJudge& judge) {
   // 0.75 times the width at half height: sum of the squared profile of any bell-like stripe.
   const double light = 0.75 * judge.profile.full_width_half_maximum() * bell.width * judge.noise.mean_weight();
@@ -189,11 +195,10 @@ std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double w
   }
   const double chi_square = fit.chi_square / std::max(1, fit.samples - 3);
   double sigma = fit.time_sigma;
-  if (chi_square > 1)
-    if (const double limit = noise_limit(fit.samples); chi_square > limit) {
-      if (judge.refuse_misfits) return std::nullopt;
-      sigma *= std::sqrt(chi_square / limit);
-    }
+  if (is_beyond_noise(chi_square, fit.samples)) {
+    if (judge.refuse_misfits) return std::nullopt;
+    sigma *= std::sqrt(chi_square / noise_limit(fit.samples));
+  }
   const Bell bell{fit.amplitude, fit.background, fit.time, width};
   const bool dark = is_lost_in_noise(bell, judge) || is_too_faint(bell, sigma, judge);
   return PixelTime{.time = fit.time,

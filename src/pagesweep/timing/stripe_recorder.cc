@@ -14,8 +14,7 @@
 namespace pagesweep {
 namespace {
 
-constexpr int columns_at_once = 128;  // whose sums stay in the cache
-constexpr int most_apart = 32;        // [frames] between the bells of pixels that are cut out together
+constexpr int most_apart = 32;  // [frames] between the bells of pixels that are cut out together
 /// Half a sigma less than a bell needs to be told from noise: between two blocks the response is that much lower.
 constexpr float least_significance = 3;
 /// What noise does not reach in a whole camera.
@@ -130,11 +129,8 @@ void StripeRecorder::look_at_rows(const Frames& frames, const Step& step, int fi
     else
       count_clipped<std::uint16_t>(frames, step.news, step.end, y, clipped_.row(y));
     const RawRow rows = raw_row(frames, y, step.begin, step.end);
-    for (int left = 0; left < sequence.width; left += columns_at_once) {
-      const int columns = std::min(columns_at_once, sequence.width - left);
-      search_.look(step.search, rows, step.begin, y, left, columns, scratch.sums);
-      for (int first = left; first < left + columns; first += tile_pixels) record(step, rows, y, first, scratch);
-    }
+    search_.look(step.search, rows, step.begin, y, scratch.sums);
+    for (int left = 0; left < sequence.width; left += tile_pixels) record(step, rows, y, left, scratch);
   }
 }
 
@@ -142,11 +138,16 @@ void StripeRecorder::record(const Step& step, const RawRow& rows, int y, int lef
   scratch.ready.clear();
   Tile& tile = tiles_(left / tile_px, y / tile_px);
   const int end = std::min(left + tile_pixels, windows_.sequence().width);
+  const auto is_new = [&](int x) {
+    return (search_.best(x, y) != recorded_place_(x, y)) & (search_.significance(x, y) >= least_significance);
+  };
+  bool any = false;
+  for (int x = left; x < end; ++x) any |= is_new(x);
+  if (!any) return;
   for (int x = left; x < end; ++x) {
+    if (!is_new(x)) continue;
     const int best = search_.best(x, y);
-    if (best == recorded_place_(x, y)) continue;
     const float significance = search_.significance(x, y);
-    if (significance < least_significance) continue;
     const bool is_clear = significance >= clear_significance;
     if (best > step.last_ready) {
       tile.waiting += is_clear;

@@ -42,11 +42,14 @@ void TileTimes::gather(int y, int left, int columns) {
   widths_.log_row(y, left, std::span(log_widths_).first(static_cast<std::size_t>(columns)));
   for (int k = 0; k < columns; ++k) {
     const int x = left + k;
-    if (windows_.centre(x, y) == StripeWindows::none)
+    if (windows_.centre(x, y) == StripeWindows::none) {
       set_time(map_, x, y, {});
-    else
-      candidates_.push_back({x, reader_.read(x, y, log_widths_[static_cast<std::size_t>(k)], k),
-                             windows_.significance(x, y) < hardly_significant});
+      continue;
+    }
+    Candidate& candidate = candidates_.emplace_back();
+    candidate.x = x;
+    candidate.may_be_noise = windows_.significance(x, y) < hardly_significant;
+    reader_.read(x, y, log_widths_[static_cast<std::size_t>(k)], k, candidate.samples);
   }
 }
 

@@ -25,9 +25,9 @@ class TileTimes {
 
  private:
   struct Candidate {
-    int x;  ///< column
+    int x = 0;  ///< column
     BellSamples samples;
-    bool may_be_noise;  ///< a bell at the limit of judge_bell(): if it cannot be fitted it is none
+    bool may_be_noise = false;  ///< a bell at the limit of judge_bell(): if it cannot be fitted it is none
   };
 
   void gather(int y, int left, int columns);

@@ -23,7 +23,8 @@ float WidthMeter::measure(const WidthTile& tile) {
 
 void WidthMeter::add(int x, int y) {
   if (windows_.centre(x, y) == StripeWindows::none || windows_.significance(x, y) < least_significance_of_width) return;
-  const BellSamples samples = reader_.read(x, y, 0, static_cast<int>(waiting_.size()));
+  BellSamples samples;
+  reader_.read(x, y, 0, static_cast<int>(waiting_.size()), samples);
   if (samples.kind == BellSamples::Kind::core || samples.kind == BellSamples::Kind::partial) {
     waiting_.push_back(samples);
     if (waiting_.size() == most_bells) fit_waiting();
