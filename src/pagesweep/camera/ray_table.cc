@@ -1,54 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/camera/ray_table.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "pagesweep/base/parallel.h"
+#include "pagesweep/camera/undistort_internal.h"
 
 namespace pagesweep {
 namespace {
 
-/// Inverts the distortion along a row of pixels.
-class RowUndistorter {
- public:
-  explicit RowUndistorter(const BrownConrady& lens) : lens_(lens) {}
-
-  /// A Newton step from where the two pixels before let expect it; full inversion where that is not enough.
-  Eigen::Vector2d operator()(const Eigen::Vector2d& distorted) {
-    Eigen::Vector2d ideal = 2 * before_ - before_that_;
-    ideal -= lens_.jacobian(ideal).inverse() * (lens_.distort(ideal) - distorted);
-    const bool near = (lens_.distort(ideal) - distorted).squaredNorm() < 1e-24;
-    if (!near || !is_valid_at(ideal.squaredNorm())) {
-      constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-      ideal = lens_.undistort(distorted).value_or(Eigen::Vector2d(nan, nan));
-    }
-    before_that_ = before_;
-    before_ = ideal;
-    return ideal;
+/// Largest r^2, up to that of 76 degrees off the axis, to which the distortion is valid.
+double largest_valid_radius_squared(const BrownConrady& lens) {
+  double valid = 0, beyond = 16;
+  if (lens.is_valid_at(beyond)) return beyond;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (valid + beyond);
+    (lens.is_valid_at(middle) ? valid : beyond) = middle;
   }
-
- private:
-  /// What is valid at a radius is valid within.
-  bool is_valid_at(double radius_squared) {
-    if (radius_squared > known_as_valid_ && lens_.is_valid_at(radius_squared)) known_as_valid_ = radius_squared;
-    return radius_squared <= known_as_valid_;
-  }
-
-  const BrownConrady& lens_;
-  double known_as_valid_ = -1;  ///< largest squared radius
-  Eigen::Vector2d before_{0, 0}, before_that_{0, 0};
-};
+  return valid;
+}
 
 }  // namespace
 
 RayTable::RayTable(const Camera& camera) : camera_(camera), directions_(camera.width, camera.height) {
+  const double valid = largest_valid_radius_squared(camera.distortion);
   parallel_rows(camera.height, [&](int y) {
-    RowUndistorter undistort(camera.distortion);
-    for (int x = 0; x < camera.width; ++x)
-      directions_(x, y) = undistort({(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy});
+    const PixelRow row{-camera.cx / camera.fx, 1 / camera.fx, (y - camera.cy) / camera.fy};
+    const auto directions = directions_.row(y);
+    undistort_row(camera.distortion, row, directions);
+    for (int x = 0; x < camera.width; ++x) {
+      Eigen::Vector2d& direction = directions[static_cast<std::size_t>(x)];
+      if (direction.squaredNorm() <= valid) continue;  // not where it is NaN
+      constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+      direction = camera.distortion.undistort({row.x + x * row.step, row.y}).value_or(Eigen::Vector2d(nan, nan));
+    }
   });
 }
 
