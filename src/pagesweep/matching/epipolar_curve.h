@@ -50,6 +50,9 @@ class View {
 
   double focal_length_px() const { return fx_; }
   LensNumbers lens() const;
+  /// [ideal coordinates] of what the picture shows, and little more.
+  const Eigen::Vector2d& lowest() const { return lowest_; }
+  const Eigen::Vector2d& highest() const { return highest_; }
   /// Part of the line a + w b (homogeneous, w in `range`) that can be in the picture: all that is seen and little more.
   InverseDepthRange clip(const Eigen::Vector3d& a, const Eigen::Vector3d& b, InverseDepthRange range) const;
 

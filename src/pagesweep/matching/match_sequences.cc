@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/matching/match_sequences.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +14,7 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/matching/sequence_fit.h"
+#include "pagesweep/matching/sequence_search_internal.h"
 #include "pagesweep/matching/sequence_store.h"
 #include "pagesweep/matching/two_way.h"
 
@@ -23,68 +23,39 @@ namespace {
 
 constexpr std::size_t pixels_at_once = 4 * PlaceBatch::most;
 
-/// An epipolar curve as an ideal lens would show it: straight, with places about a pixel apart.
-struct SampledCurve {
-  CurveLine line{};
-  double far = 0, near = 0;      ///< [1/mm] at both ends
-  double z_far = 1, z_near = 1;  ///< of the points there, up to a common scale
-
-  SampledCurve() = default;
-  SampledCurve(const EpipolarCurve& curve, const LensNumbers& lens) : far(curve.range().far), near(curve.range().near) {
-    const Eigen::Vector3d start = curve.direction() + far * curve.origin();
-    const Eigen::Vector3d end = curve.direction() + near * curve.origin();
-    z_far = start.z();
-    z_near = end.z();
-    const Eigen::Vector2d first = start.hnormalized(), way = end.hnormalized() - first;
-    const int steps =
-        std::max(1, static_cast<int>(std::ceil(Eigen::Vector2d(lens.fx * way.x(), lens.fy * way.y()).norm())));
-    const Eigen::Vector2f step = (way / steps).cast<float>();
-    line = {static_cast<float>(first.x()), static_cast<float>(first.y()), step.x(), step.y(), steps + 1};
-  }
-
-  /// [1/mm] What is even in the picture is not in depth: a mixture of homogeneous points weighs them by their z.
-  double inverse_depth(double place) const {
-    const double share = place / (line.count - 1);
-    const double weight_near = share * z_far, weight_far = (1 - share) * z_near;
-    return (weight_far * far + weight_near * near) / (weight_far + weight_near);
-  }
-};
-
 /// A pixel that looks for its match.
 struct Seeker {
-  int x = 0, y = 0;
-  SampledCurve curve;
-  double energy = 0;                         ///< of its sequence, in the store's own units
-  std::vector<std::int32_t> pixels, scores;  ///< of the curve's places, see ScoredCurve
+  std::int32_t index = 0;             ///< see SequenceStore
+  std::array<double, 3> direction{};  ///< see CurveFrame
+  CurveLine line{};
+  float far = 0, near = 0;      ///< [1/mm] at the line's ends
+  float z_far = 1, z_near = 1;  ///< of the points there, up to a common scale
+  double energy = 0;            ///< of its sequence, in the store's own units
+  std::vector<std::int32_t> pairs;
+  OwnSequence own{};
+  ScoredCurve curve;
   std::vector<CurveMinimum> minima;
-  std::span<CurveMinimum> unseen;     ///< minima that are neither fitted nor improved
-  std::span<CurveMinimum> promising;  ///< improved, and in order
+  std::span<CurveMinimum> unseen;     ///< minima that are not improved
+  std::span<CurveMinimum> promising;  ///< the lowest; improved, and in order, if there are several
   std::size_t next = 0;               ///< of the promising ones
   SequenceFit best;
   bool has_best = false;
   int place_of_best = 0;
-  double sigma_px = 0;  ///< of the best
   std::optional<Match> verdict;
 
-  /// \return the first score, behind a highest one
-  std::int32_t* make_room(int count) {
-    const auto room = static_cast<std::size_t>(count) + 2 * score_padding;
-    if (pixels.size() < room) {
-      pixels.resize(room);
-      scores.resize(room);
-      minima.resize(room);
-    }
-    scores[score_padding - 1] = std::numeric_limits<std::int32_t>::max();
-    return scores.data() + score_padding;
-  }
   /// Whether there is a place that may lead. \param slack  of the energy, that its distance may be too large
   bool has_more(double slack) const {
     if (next == promising.size()) return false;
     return !has_best || promising[next].distance_squared <= best.distance_squared + slack * energy;
   }
   std::span<const std::int32_t> scores_between(int first, int last) const {
-    return std::span(scores).subspan(static_cast<std::size_t>(score_padding + first),
-                                     static_cast<std::size_t>(last - first + 1));
+    return {curve.first_score() + first, static_cast<std::size_t>(last - first + 1)};
+  }
+  /// [1/mm] What is even in the picture is not in depth: a mixture of homogeneous points weighs them by their z.
+  double inverse_depth(float place) const {
+    const double share = curve.share_at(place);
+    const double weight_near = share * z_far, weight_far = (1 - share) * z_near;
+    return (weight_near * near + weight_far * far) / (weight_near + weight_far);
   }
 };
 
@@ -94,86 +65,136 @@ class SequenceFinder final : public MatchFinder {
  public:
   SequenceFinder(const SequenceStore& from, const SequenceStore& to, const MatchOptions& options)
       : from_(from),
-        to_arrays_(to.arrays()),
+        to_(to.arrays()),
         options_(options),
         affine_(options.normalisation == Normalisation::affine),
         fitter_(from, to, options) {
-    curves_.reserve(pixels_at_once);
+    for (Seeker& seeker : seekers_) {
+      seeker.pairs.resize(static_cast<std::size_t>(to_.pairs));
+      seeker.own.pairs = seeker.pairs.data();
+    }
   }
 
   Match find(int x, int y, const EpipolarCurve& curve, double) override {
-    curves_.clear();
-    lens_ = curve.view().lens();
-    seek(x, y, curve);
-    decide();
+    look_into(curve.view(), curve.origin(), curve.range());
+    seekers_[0].index = from_.index(x, y);
+    set_direction(seekers_[0], curve.direction());
+    find_all(1);
     return *seekers_[0].verdict;
   }
 
-  /// Matches the pixels (x, y), (x + 1, y), ..., at most pixels_at_once of them.
-  void find_run(int x, int y, const EpipolarGeometry& geometry, std::span<Match> matches);
+  /// Which picture the curves are in, and their range of depths.
+  void look_into(const View& view, const Eigen::Vector3d& origin, const InverseDepthRange& range) {
+    frame_ = {view.lens(),
+              {origin.x(), origin.y(), origin.z()},
+              {view.lowest().x(), view.lowest().y()},
+              {view.highest().x(), view.highest().y()},
+              range.far,
+              range.near};
+  }
+  /// Matches the pixels of a rectangle, at most pixels_at_once of them.
+  void find_block(int left, int top, int right, int bottom, const EpipolarGeometry& geometry, Correspondences& matches);
 
  private:
   /// By how much of the energy the pixels nearest to a curve, up to half a pixel from it, may score worse than the
   /// curve itself; and by how much worse one of its places, up to half a pixel beside the best one.
   static constexpr double across = 0.15, along = 0.15;
 
-  void seek(int x, int y, const EpipolarCurve& curve);
-  ScoredCurve scored(const Seeker& seeker) const {
-    return {&to_arrays_,
-            seeker.pixels.data(),
-            seeker.scores.data() + score_padding,
-            seeker.curve.line.count,
-            from_.square(seeker.x, seeker.y),
-            affine_};
+  static void set_direction(Seeker& seeker, const Eigen::Vector3d& direction) {
+    seeker.direction = {direction.x(), direction.y(), direction.z()};
+  }
+  void find_all(std::size_t count);
+  void lay(std::span<Seeker> seekers);
+  void seek(Seeker& seeker);
+  void improve(const Seeker& seeker, std::span<CurveMinimum> minima) const {
+    improve_minima(to_, seeker.curve, seeker.own.square, affine_, minima);
   }
   void improve_others(Seeker& seeker) const;
-  void decide();
+  void decide(std::span<Seeker> seekers);
+  void ask(Seeker& seeker);
   void hear(const SequenceFit& fit, Seeker& seeker) const;
-  Match judge(const Seeker& seeker) const;
+  void judge(Seeker& seeker) const;
+  void judge_sigmas(std::span<Seeker> seekers);
+  bool matches(const Seeker& seeker) const {
+    return seeker.has_best && seeker.best.distance_squared <= options_.max_dissimilarity * seeker.energy;
+  }
   bool is_rival(const SequenceFit& other, int place_of_other, const Seeker& seeker) const;
 
   const SequenceStore& from_;
-  SequenceArrays to_arrays_;
+  const SequenceArrays& to_;
   const MatchOptions& options_;
   bool affine_;
   SequenceFitter fitter_;
-  LensNumbers lens_{};                 ///< of the other camera
-  std::vector<EpipolarCurve> curves_;  ///< of the seekers
+  CurveFrame frame_{};
+  LineBatch lines_;
   std::array<Seeker, pixels_at_once> seekers_;
-  std::array<SequenceFit, pixels_at_once> fits_;
-  std::vector<Seeker*> asked_for_;  ///< by whom the fits were
+  std::array<SequenceFit, pixels_at_once> fits_;  ///< of each seeker
+  std::vector<SequenceFit*> asked_, heard_;
 };
 
+void SequenceFinder::find_all(std::size_t count) {
+  const auto seekers = std::span(seekers_).first(count);
+  lay(seekers);
+  for (Seeker& seeker : seekers) seek(seeker);
+  decide(seekers);
+  judge_sigmas(seekers);
+}
+
+/// Lays the epipolar curves.
+void SequenceFinder::lay(std::span<Seeker> seekers) {
+  for (std::size_t first = 0; first < seekers.size(); first += LineBatch::most) {
+    const auto some = seekers.subspan(first, std::min<std::size_t>(LineBatch::most, seekers.size() - first));
+    for (std::size_t k = 0; k < some.size(); ++k)
+      for (std::size_t i = 0; i < 3; ++i) lines_.direction[i][k] = some[k].direction[i];
+    lay_lines(frame_, to_.along_rows, lines_);
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      some[k].line = lines_.line(k);
+      some[k].far = lines_.far[k];
+      some[k].near = lines_.near[k];
+      some[k].z_far = lines_.z_far[k];
+      some[k].z_near = lines_.z_near[k];
+    }
+  }
+}
+
 /// Compares with the pixels nearest to the curve, and notes the most promising places.
-void SequenceFinder::seek(int x, int y, const EpipolarCurve& curve) {
-  Seeker& seeker = seekers_[curves_.size()];
-  curves_.push_back(curve);
-  seeker.x = x;
-  seeker.y = y;
-  seeker.curve = SampledCurve(curve, lens_);
-  seeker.energy = from_.energy(x, y);
+void SequenceFinder::seek(Seeker& seeker) {
   seeker.next = 0;
   seeker.has_best = false;
   seeker.verdict.reset();
-  const int count = seeker.curve.line.count;
-  std::int32_t* scores = seeker.make_room(count);
-  const double least = score_curve(to_arrays_, lens_, seeker.curve.line, from_.sequence(x, y), from_.square(x, y),
-                                   seeker.pixels.data(), scores);
-  constexpr double largest = std::numeric_limits<std::int32_t>::max();
-  const double limit = std::min(least, options_.max_dissimilarity * seeker.energy) + (across + along) * seeker.energy;
+  seeker.unseen = seeker.promising = {};
+  if (!(seeker.line.count > 0)) {
+    seeker.verdict = Match::none(PixelStatus::outside_view);
+    return;
+  }
+  seeker.energy = from_.energy(seeker.index);
+  from_.copy(seeker.index, seeker.pairs);
+  seeker.own.square = from_.square(seeker.index);
+  score_curve(to_, frame_.lens, seeker.line, seeker.own, seeker.curve);
+  if (seeker.minima.size() <= static_cast<std::size_t>(seeker.curve.count))
+    seeker.minima.resize(static_cast<std::size_t>(seeker.curve.count) + 1);
+  constexpr double largest = std::numeric_limits<std::int32_t>::max() - 1;
+  const double least = seeker.curve.least, slack = (across + along) * seeker.energy;
+  const double limit = std::min(least, options_.max_dissimilarity * seeker.energy) + slack;
   const int minima =
-      find_minima(scored(seeker), static_cast<std::int32_t>(std::min(limit, largest)), seeker.minima.data());
+      find_minima(seeker.curve, static_cast<std::int32_t>(std::min(limit, largest)), seeker.minima.data());
   const auto found = std::span(seeker.minima).first(static_cast<std::size_t>(minima));
-  constexpr std::size_t at_first = 2;
-  seeker.promising = found.first(std::min(found.size(), at_first));
-  seeker.unseen = found.subspan(seeker.promising.size());
-  if (!seeker.unseen.empty())
-    std::ranges::partial_sort(found, seeker.unseen.begin(), {}, &CurveMinimum::distance_squared);
-  improve_minima(scored(seeker), seeker.promising);
-  std::ranges::sort(seeker.promising, {}, &CurveMinimum::distance_squared);
+  if (found.empty()) return;
+  const double close = found[0].distance_squared + along * seeker.energy;
+  const auto beyond =
+      std::ranges::partition(found.subspan(1), [&](const auto& m) { return m.distance_squared <= close; });
+  seeker.unseen = found.last(beyond.size());
+  seeker.promising = found.first(found.size() - beyond.size());
+  if (seeker.promising.size() > 1) {
+    improve(seeker, seeker.promising);
+    std::ranges::sort(seeker.promising, {}, &CurveMinimum::distance_squared);
+  } else {  // it will be on the side of the better neighbour
+    const std::int32_t* score = seeker.curve.first_score() + static_cast<int>(found[0].place);
+    found[0].place += score[-1] < score[1] ? -0.25f : 0.25f;
+  }
 }
 
-/// When the first places left the verdict open: which of the others may lead.
+/// When the lowest places left the verdict open: which of the others may lead.
 void SequenceFinder::improve_others(Seeker& seeker) const {
   constexpr std::size_t most = 6;
   auto others = std::exchange(seeker.unseen, {});
@@ -182,57 +203,88 @@ void SequenceFinder::improve_others(Seeker& seeker) const {
     const auto beyond = std::ranges::partition(others, [&](const auto& m) { return m.distance_squared <= limit; });
     others = others.first(others.size() - beyond.size());
   }
-  improve_minima(scored(seeker), others);
+  improve(seeker, others);
   std::ranges::sort(others, {}, &CurveMinimum::distance_squared);
   seeker.promising = others.first(std::min(others.size(), most));
   seeker.next = 0;
 }
 
 /// In rounds: fits each seeker's most promising place, until a verdict is found or no other place can change it.
-void SequenceFinder::decide() {
-  const auto seekers = std::span(seekers_).first(curves_.size());
-  for (asked_for_.clear();; asked_for_.clear()) {
-    for (Seeker& seeker : seekers) {
-      if (seeker.verdict) continue;
-      if (!seeker.unseen.empty() && !seeker.has_more(across)) improve_others(seeker);
-      if (seeker.has_more(across)) {
-        const auto index = static_cast<std::size_t>(&seeker - seekers_.data());
-        const double depth = seeker.curve.inverse_depth(seeker.promising[seeker.next++].place);
-        fits_[asked_for_.size()].begin(seeker.x, seeker.y, curves_[index], depth);
-        asked_for_.push_back(&seeker);
-      } else {
-        seeker.verdict = judge(seeker);
-      }
+void SequenceFinder::decide(std::span<Seeker> seekers) {
+  asked_.clear();
+  for (Seeker& seeker : seekers) ask(seeker);
+  while (!asked_.empty()) {
+    const std::size_t moving = fitter_.fit(frame_, asked_);
+    heard_.assign(asked_.begin() + static_cast<std::ptrdiff_t>(moving), asked_.end());
+    asked_.resize(moving);
+    for (const SequenceFit* fit : heard_) {
+      Seeker& seeker = seekers[static_cast<std::size_t>(fit - fits_.data())];
+      if (fit->found) hear(*fit, seeker);
+      ask(seeker);
     }
-    if (asked_for_.empty()) return;
-    fitter_.fit(std::span(fits_).first(asked_for_.size()));
-    for (std::size_t k = 0; k < asked_for_.size(); ++k)
-      if (fits_[k].found) hear(fits_[k], *asked_for_[k]);
   }
+}
+
+/// Asks for a fit at the seeker's most promising place, if it needs one for its verdict.
+void SequenceFinder::ask(Seeker& seeker) {
+  if (seeker.verdict) return;
+  if (!seeker.unseen.empty() && !seeker.has_more(across)) improve_others(seeker);
+  if (!seeker.has_more(across)) {
+    judge(seeker);
+    return;
+  }
+  SequenceFit& fit = fits_[static_cast<std::size_t>(&seeker - seekers_.data())];
+  fit.index = seeker.index;
+  fit.own = seeker.own;
+  fit.direction = &seeker.direction;
+  fit.inverse_depth = seeker.inverse_depth(seeker.promising[seeker.next++].place);
+  fit.attempts = 0;
+  asked_.push_back(&fit);
 }
 
 /// What a fit says about its seeker: it may be the best so far, or make it ambiguous.
 void SequenceFinder::hear(const SequenceFit& fit, Seeker& seeker) const {
-  const int place = static_cast<int>(seeker.promising[seeker.next - 1].place);
+  const int place = static_cast<int>(seeker.promising[seeker.next - 1].place + 0.5f);
   const bool has_rival = seeker.has_best && is_rival(fit, place, seeker);
   if (!seeker.has_best || fit.distance_squared < seeker.best.distance_squared) {
     seeker.best = fit;
     seeker.has_best = true;
     seeker.place_of_best = place;
-    seeker.sigma_px = fitter_.sigma_px(fit);
   }
-  const bool matches = seeker.best.distance_squared <= options_.max_dissimilarity * seeker.energy;
-  if (matches && (has_rival || !(seeker.sigma_px <= options_.max_sigma_px)))
+  if (matches(seeker) && (has_rival || !(seeker.best.least_sigma_px <= options_.max_sigma_px)))
     seeker.verdict = Match::none(PixelStatus::ambiguous);
 }
 
-/// When all places that may lead have been heard.
-Match SequenceFinder::judge(const Seeker& seeker) const {
-  if (seeker.has_best && seeker.best.distance_squared <= options_.max_dissimilarity * seeker.energy)
-    return {PixelStatus::ok, seeker.best.pixel, seeker.sigma_px, seeker.best.inverse_depth, not_a_number};
-  const auto places = std::span(seeker.pixels).first(static_cast<std::size_t>(seeker.curve.line.count));
-  const bool has_view = std::ranges::any_of(places, [&](std::int32_t p) { return p != to_arrays_.nowhere(); });
-  return Match::none(has_view ? PixelStatus::no_match : PixelStatus::outside_view);
+/// When all places that may lead have been heard. A match has no sigma yet.
+void SequenceFinder::judge(Seeker& seeker) const {
+  if (matches(seeker)) {
+    seeker.verdict = {PixelStatus::ok, seeker.best.pixel, 0, seeker.best.inverse_depth, not_a_number};
+  } else {
+    seeker.verdict = Match::none(!seeker.curve.runs.empty() ? PixelStatus::no_match : PixelStatus::outside_view);
+  }
+}
+
+/// Gives matches their sigma, which may be too large.
+void SequenceFinder::judge_sigmas(std::span<Seeker> seekers) {
+  std::array<const SequenceFit*, MixtureBatch::most> fits;
+  std::array<Seeker*, MixtureBatch::most> whose;
+  std::array<double, MixtureBatch::most> sigmas_px;
+  std::size_t count = 0;
+  const auto flush = [&] {
+    fitter_.find_sigmas(std::span(fits).first(count), sigmas_px);
+    for (std::size_t k = 0; k < count; ++k) {
+      whose[k]->verdict->sigma_px = sigmas_px[k];
+      if (!(sigmas_px[k] <= options_.max_sigma_px)) whose[k]->verdict = Match::none(PixelStatus::ambiguous);
+    }
+    count = 0;
+  };
+  for (Seeker& seeker : seekers) {
+    if (seeker.verdict->status != PixelStatus::ok) continue;
+    fits[count] = &seeker.best;
+    whose[count++] = &seeker;
+    if (count == MixtureBatch::most) flush();
+  }
+  if (count > 0) flush();
 }
 
 /// Whether two places fit equally well, within the margin, with worse ones in between: a wide minimum is no rivalry, it
@@ -247,25 +299,21 @@ bool SequenceFinder::is_rival(const SequenceFit& other, int place, const Seeker&
   return barrier > more + margin;
 }
 
-void SequenceFinder::find_run(int x, int y, const EpipolarGeometry& geometry, std::span<Match> matches) {
-  curves_.clear();
-  lens_ = geometry.view().lens();
-  std::array<std::size_t, pixels_at_once> seeker;
-  for (std::size_t k = 0; k < matches.size(); ++k) {
-    const int column = x + static_cast<int>(k);
-    matches[k] = Match::none(from_.status(column, y));
-    if (matches[k].status != PixelStatus::ok) continue;
-    const EpipolarCurve curve = geometry.curve(column, y);
-    if (curve.range().empty()) {
-      matches[k] = Match::none(PixelStatus::outside_view);
-      continue;
+void SequenceFinder::find_block(int left, int top, int right, int bottom, const EpipolarGeometry& geometry,
+                                Correspondences& matches) {
+  std::array<std::pair<int, int>, pixels_at_once> pixels;
+  std::size_t count = 0;
+  for (int y = top; y < bottom; ++y)
+    for (int x = left; x < right; ++x) {
+      const std::int32_t index = from_.index(x, y);
+      matches.status(x, y) = from_.status(index);
+      if (from_.status(index) != PixelStatus::ok) continue;
+      seekers_[count].index = index;
+      set_direction(seekers_[count], geometry.direction(x, y));
+      pixels[count++] = {x, y};
     }
-    seeker[k] = curves_.size();
-    seek(column, y, curve);
-  }
-  decide();
-  for (std::size_t k = 0; k < matches.size(); ++k)
-    if (matches[k].status == PixelStatus::ok) matches[k] = *seekers_[seeker[k]].verdict;
+  find_all(count);
+  for (std::size_t k = 0; k < count; ++k) put(*seekers_[k].verdict, pixels[k].first, pixels[k].second, matches);
 }
 
 class SequenceMatcher final : public PixelMatcher {
@@ -273,20 +321,19 @@ class SequenceMatcher final : public PixelMatcher {
   SequenceMatcher(const SequenceStore& from, const SequenceStore& to, const MatchOptions& options)
       : from_(from), to_(to), options_(options) {}
 
-  PixelStatus status_of(int x, int y) const override { return from_.status(x, y); }
+  PixelStatus status_of(int x, int y) const override { return from_.status(from_.index(x, y)); }
   std::unique_ptr<MatchFinder> make_finder() const override {
     return std::make_unique<SequenceFinder>(from_, to_, options_);
   }
-  /// Along the rows: neighbours look at nearly the same pixels of the other camera.
+  /// Along the lines of what is stored: neighbours look at nearly the same pixels of the other camera.
   void match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const override {
     SequenceFinder finder(from_, to_, options_);
-    std::array<Match, pixels_at_once> run;
-    for (int y = top; y < bottom; ++y)
-      for (int x = 0; x < matches.width(); x += static_cast<int>(pixels_at_once)) {
-        const std::size_t count = std::min<std::size_t>(pixels_at_once, static_cast<std::size_t>(matches.width() - x));
-        finder.find_run(x, y, geometry, std::span(run).first(count));
-        for (std::size_t k = 0; k < count; ++k) put(run[k], x + static_cast<int>(k), y, matches);
-      }
+    finder.look_into(geometry.view(), geometry.origin(), geometry.range());
+    constexpr int all = static_cast<int>(pixels_at_once);
+    const int rows = from_.arrays().along_rows ? 1 : std::min(all, bottom - top), columns = all / rows;
+    for (int y = top; y < bottom; y += rows)
+      for (int x = 0; x < matches.width(); x += columns)
+        finder.find_block(x, y, std::min(x + columns, matches.width()), std::min(y + rows, bottom), geometry, matches);
   }
 
  private:
@@ -294,6 +341,12 @@ class SequenceMatcher final : public PixelMatcher {
   const SequenceStore& to_;
   const MatchOptions& options_;
 };
+
+/// Whether one camera's epipolar curves run along the rows of another's picture rather than its columns, in its middle.
+bool runs_along_rows(const Camera& from, const Camera& to) {
+  const Eigen::Vector3d epipole = to.cam_from_rig * from.center();
+  return std::abs(epipole.x()) >= std::abs(epipole.y());
+}
 
 void require_size(const Frames& frames, const RayTable& camera) {
   if (frames.width() != camera.width() || frames.height() != camera.height())
@@ -311,7 +364,9 @@ MatchPair match_sequences(const Frames& first, const Frames& second, const RayTa
     if (first.has(i) && second.has(i)) instants.push_back(i);
   if (instants.size() < 3)
     throw no_result("fewer than 3 frames were taken by both cameras, so that their sequences cannot be compared");
-  const SequenceStore first_store(first, instants, options), second_store(second, instants, options);
+  const Camera &camera1 = first_camera.camera(), &camera2 = second_camera.camera();
+  const SequenceStore first_store(first, instants, runs_along_rows(camera2, camera1), options);
+  const SequenceStore second_store(second, instants, runs_along_rows(camera1, camera2), options);
   const SequenceMatcher from_first(first_store, second_store, options), from_second(second_store, first_store, options);
   return match_both_ways(first_camera, second_camera, from_first, from_second, options, progress);
 }

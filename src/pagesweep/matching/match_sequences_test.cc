@@ -3,10 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <functional>
 #include <random>
+#include <utility>
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
@@ -233,6 +235,28 @@ TEST_F(MatchSequences, ARepeatedPatternIsAmbiguous) {
   const Frames frames1 = expose(cylinder, cam1, grating, 8, {}, 1), frames2 = expose(cylinder, cam2, grating, 8, {}, 2);
   const Correspondences matches = match_sequences(frames1, frames2, cam1, cam2, options).from_first;
   EXPECT_EQ(matches.status(80, 80), PixelStatus::ambiguous);
+}
+
+TEST_F(MatchSequences, CamerasMayBeTurned) {
+  // By a quarter curves run along the rows, by an eighth neither along rows nor columns.
+  for (const auto& [first, second] : {std::pair(M_PI / 2, 0.0), std::pair(0.0, M_PI / 4)}) {
+    SCOPED_TRACE(testing::Message() << first << ' ' << second);
+    Rig turned = rig;
+    const auto turn = [](Camera& camera, double angle) {
+      const Eigen::AngleAxisd rotation(angle, Eigen::Vector3d::UnitZ());
+      camera.cam_from_rig = Rigid3(rotation.toRotationMatrix(), Eigen::Vector3d::Zero()) * camera.cam_from_rig;
+    };
+    turn(turned.cameras[0], first);
+    turn(turned.cameras[1], second);
+    const Frames frames1 = expose(cylinder, turned.cameras[0], random_waves, 16, {}, 1);
+    const Frames frames2 = expose(cylinder, turned.cameras[1], random_waves, 16, {}, 2);
+    const MatchPair pair = match_sequences(frames1, frames2, turned.cameras[0], turned.cameras[1]);
+    const Result r = compare(pair.from_first, cylinder, turned.cameras[0], turned.cameras[1]);
+    EXPECT_GT(r.matched, 0.95 * r.should_match);
+    EXPECT_EQ(r.wrong, 0);
+    EXPECT_LT(r.rms_px, 0.06);
+    EXPECT_LT(r.normalised_rms, 1.2);
+  }
 }
 
 TEST_F(MatchSequences, RefusesTooFewFramesAndWrongSizes) {

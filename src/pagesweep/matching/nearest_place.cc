@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/matching/nearest_place.h"
 
+#include <cmath>
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -17,15 +18,18 @@ namespace pagesweep::HWY_NAMESPACE {
 namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Doubles = hn::CappedTag<double, PlaceBatch::most>;
-using Vector = hn::Vec<Doubles>;
-using Mask = hn::Mask<Doubles>;
+using Floats = hn::CappedTag<float, PlaceBatch::most>;
+using Vector = hn::Vec<Floats>;
+using Mask = hn::Mask<Floats>;
 constexpr std::size_t crossings = PlaceBatch::crossings;
 
-Vector set(double value) { return hn::Set(Doubles(), value); }
-Vector zero() { return hn::Zero(Doubles()); }
+Vector set(double value) { return hn::Set(Floats(), static_cast<float>(value)); }
+Vector zero() { return hn::Zero(Floats()); }
 Vector square(Vector v) { return hn::Mul(v, v); }
 Vector clamp_share(Vector t) { return hn::Min(hn::Max(t, zero()), set(1)); }
+
+/// What rounding may do to a sum of products, as a share of g . g.
+constexpr double rounding = 1e-6;
 
 /// A place between the crossings 1 and 2.
 struct Place {
@@ -67,8 +71,8 @@ class Pixels {
   }
 
   Mask has(std::size_t crossing) const { return hn::Gt(load(batch_.usable[crossing]), zero()); }
-  Vector load(const PlaceBatch::Each& values) const { return hn::Load(Doubles(), &values[first_]); }
-  void store(Vector v, PlaceBatch::Each& values) const { hn::Store(v, Doubles(), &values[first_]); }
+  Vector load(const PlaceBatch::Each& values) const { return hn::Load(Floats(), &values[first_]); }
+  void store(Vector v, PlaceBatch::Each& values) const { hn::Store(v, Floats(), &values[first_]); }
 
   /// Takes the noise's expected part off the crossings' squares, or adds it again.
   void add_noise(Vector energy) {
@@ -106,16 +110,42 @@ class Pixels {
   Place polish(Vector share, Mask moving) const {
     constexpr int steps = 4;
     auto [here, step] = compare(share);
-    for (int i = 0; i < steps && !hn::AllFalse(Doubles(), moving); ++i) {
+    for (int i = 0; i < steps && !hn::AllFalse(Floats(), moving); ++i) {
       const Vector bounded = hn::Min(hn::Max(step, set(-0.5)), set(0.5));
       const auto [there, next_step] = compare(clamp_share(hn::Add(here.share, bounded)));
-      moving = hn::And(moving, hn::Le(there.distance_squared, here.distance_squared));
+      const Vector limit = hn::MulAdd(set(rounding), gg_, here.distance_squared);
+      moving = hn::And(moving, hn::Le(there.distance_squared, limit));
       const Mask arrived = hn::Lt(hn::Abs(step), set(1e-4));
       here = select(moving, there, here);
       step = hn::IfThenElse(moving, next_step, step);
       moving = hn::AndNot(arrived, moving);
     }
     return here;
+  }
+
+  /// How much the sequences change along the curve at a place, and what follows for its standard deviation.
+  void judge(const Place& place, const Weights& weights, Vector noise_variance, Vector doubt, PlaceBatch& out) const {
+    Vector gd = zero(), dd = zero(), noise = zero();
+    for (std::size_t k = 0; k < crossings; ++k) {
+      Vector changed = zero();
+      for (std::size_t j = 0; j < crossings; ++j) changed = hn::MulAdd(ss_[k][j], weights.change[j], changed);
+      gd = hn::MulAdd(gs_[k], weights.change[k], gd);
+      dd = hn::MulAdd(changed, weights.change[k], dd);
+      noise = hn::MulAdd(square(weights.change[k]), noise_share_[k], noise);
+    }
+    const Vector gain_squared = square(place.gain);
+    const Vector along_own = affine_ ? hn::Div(gd, gg_) : zero();
+    const Vector rounded = hn::NegMulAdd(set(rounding), gg_, hn::NegMulAdd(along_own, gd, dd));
+    const Vector change = hn::Mul(gain_squared, rounded);
+    // Noise of the crossings looks like change; only what exceeds it, and its chi-squared scatter, is known to be
+    // change.
+    const Vector most_noise = set(batch_.samples * (1 + 3 * std::sqrt(2 / batch_.samples)));
+    const Vector known = hn::NegMulAdd(hn::Mul(noise_variance, most_noise), hn::Mul(noise, gain_squared), change);
+    const Vector variance = hn::Div(place.distance_squared, hn::Mul(set(batch_.freedom), known));
+    const Vector sigma = hn::Sqrt(hn::MulAdd(doubt, doubt, variance));
+    store(hn::Max(known, zero()), out.change_squared);
+    store(hn::Mul(place.gain, along_own), out.change_along_own);
+    store(hn::IfThenElse(hn::Gt(known, zero()), sigma, set(std::numeric_limits<float>::infinity())), out.sigma);
   }
 
   Vector distance_squared(const Weights& weights) const {
@@ -190,19 +220,24 @@ void find_some(PlaceBatch& batch, std::size_t first, bool affine, bool wants_cub
   Place place = select(is_cubic, cubic, linear);
   const Weights linear_weights = linear_at(place.share);
   Weights weights = cubic_at(place.share);
-  for (std::size_t k = 0; k < crossings; ++k)
+  for (std::size_t k = 0; k < crossings; ++k) {
     weights.value[k] = hn::IfThenElse(is_cubic, weights.value[k], linear_weights.value[k]);
+    weights.change[k] = hn::IfThenElse(is_cubic, weights.change[k], linear_weights.change[k]);
+  }
   place.distance_squared = pixels.distance_squared(weights);
   pixels.store(place.distance_squared, batch.distance_squared);
-  pixels.store(pixels.noise_variance(place, weights), batch.noise_variance);
+  const Vector noise_variance = pixels.noise_variance(place, weights);
+  const Vector doubt = hn::IfThenElseZero(has_four, hn::Abs(hn::Sub(cubic.share, linear.share)));
+  pixels.judge(place, weights, noise_variance, doubt, batch);
+  pixels.store(noise_variance, batch.noise_variance);
   pixels.store(place.gain, batch.gain);
-  pixels.store(hn::IfThenElse(has_two, place.share, set(std::numeric_limits<double>::quiet_NaN())), batch.share);
+  pixels.store(hn::IfThenElse(has_two, place.share, set(std::numeric_limits<float>::quiet_NaN())), batch.share);
   pixels.store(hn::IfThenElseZero(is_cubic, set(1)), batch.is_cubic);
-  pixels.store(hn::IfThenElseZero(has_four, hn::Abs(hn::Sub(cubic.share, linear.share))), batch.doubt);
+  pixels.store(doubt, batch.doubt);
 }
 
 void FindNearestPlaces(PlaceBatch& batch, Normalisation normalisation, Interpolation interpolation) {
-  for (std::size_t first = 0; first < batch.count; first += hn::Lanes(Doubles()))
+  for (std::size_t first = 0; first < batch.count; first += hn::Lanes(Floats()))
     find_some(batch, first, normalisation == Normalisation::affine, interpolation == Interpolation::cubic);
 }
 

@@ -14,8 +14,8 @@ namespace pagesweep {
 /// pixel.
 struct PlaceBatch {
   static constexpr int most = 16;
-  static constexpr std::size_t crossings = CrossingProducts::crossings;
-  using Each = std::array<double, most>;
+  static constexpr std::size_t crossings = Crossings::count;
+  using Each = std::array<float, most>;
 
   std::size_t count = most;  ///< pixels
   double samples = 1;        ///< frames of a sequence
@@ -34,6 +34,11 @@ struct PlaceBatch {
   alignas(64) Each noise_variance{};    ///< of a sample of the other camera, if both share in the residual alike
   alignas(64) Each gain{};              ///< by which the interpolated sequence is scaled
   alignas(64) Each doubt{};  ///< [crossings] that the interpolation leaves: as much as linear and cubic differ
+  /// Sum over the frames of the squared change a crossing, without what a gain could mimic and what is but noise.
+  alignas(64) Each change_squared{};
+  alignas(64) Each change_along_own{};  ///< part of the interpolated sequence's change that a gain could mimic, in g
+  /// [crossings] standard deviation of the place if residuals are alike in all frames; infinite if nothing changes.
+  alignas(64) Each sigma{};
 };
 
 /// Weights of the four crossings in an interpolated sequence, and their changes a crossing.

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace pagesweep {
 namespace {
 
-constexpr std::size_t crossings = PlaceBatch::crossings;
+constexpr std::size_t crossings = Crossings::count;
 
 CrossingWeights weights_of(const SequenceFit& fit) {
   return fit.is_cubic ? cubic_weights(fit.share) : linear_weights(fit.share);
@@ -21,98 +22,131 @@ SequenceFitter::SequenceFitter(const SequenceStore& from, const SequenceStore& t
       to_(to),
       to_arrays_(to.arrays()),
       options_(options),
-      affine_(options.normalisation == Normalisation::affine) {
+      width_(to_arrays_.along_rows ? to_arrays_.places : to_arrays_.lines),
+      height_(to_arrays_.along_rows ? to_arrays_.lines : to_arrays_.places) {
+  const bool affine = options.normalisation == Normalisation::affine;
   batch_.samples = from.samples();
-  batch_.freedom = std::max(1.0, from.samples() - (affine_ ? 3.0 : 1.0));
+  batch_.freedom = std::max(1.0, from.samples() - (affine ? 3.0 : 1.0));
+  const auto pairs = static_cast<std::size_t>(to_arrays_.pairs);
+  mixtures_.own.resize(pairs * MixtureBatch::most);
+  mixtures_.crossings.resize(pairs * MixtureBatch::most * crossings);
 }
 
-void SequenceFitter::fit(std::span<SequenceFit> fits) {
-  constexpr int most_moves = 6;
-  waiting_.clear();
-  for (SequenceFit& fit : fits) waiting_.push_back(&fit);
-  for (int move = 0; move < most_moves && !waiting_.empty(); ++move) {
-    moved_.clear();
-    for (std::size_t first = 0; first < waiting_.size(); first += PlaceBatch::most) {
-      const std::size_t count = std::min<std::size_t>(PlaceBatch::most, waiting_.size() - first);
-      const auto some = std::span(waiting_).subspan(first, count);
-      for (auto& usable : batch_.usable) usable.fill(0);
-      batch_.count = count;
-      for (std::size_t lane = 0; lane < count; ++lane) load(*some[lane], lane);
-      find_nearest_places(batch_, options_.normalisation, options_.interpolation);
-      for (std::size_t lane = 0; lane < count; ++lane)
-        if (take(lane, *some[lane])) moved_.push_back(some[lane]);
+std::size_t SequenceFitter::fit(const CurveFrame& frame, std::span<SequenceFit*> fits) {
+  std::size_t moving = 0;
+  for (std::size_t first = 0; first < fits.size(); first += PlaceBatch::most) {
+    const auto some = fits.subspan(first, std::min<std::size_t>(PlaceBatch::most, fits.size() - first));
+    begin(frame, some);
+    spread(some);
+    multiply_all(some);
+    find_nearest_places(batch_, options_.normalisation, options_.interpolation);
+    for (std::size_t lane = 0; lane < some.size(); ++lane)
+      if (!arrives(lane, *some[lane])) std::swap(fits[moving++], fits[first + lane]);
+  }
+  return moving;
+}
+
+/// Where curves cross the grid around the places from which fits start.
+void SequenceFitter::begin(const CurveFrame& frame, std::span<SequenceFit* const> fits) {
+  if (std::ranges::all_of(fits, [](const SequenceFit* fit) { return fit->attempts > 0; })) return;
+  for (std::size_t lane = 0; lane < fits.size(); ++lane) {
+    for (std::size_t i = 0; i < 3; ++i) grid_.direction[i][lane] = (*fits[lane]->direction)[i];
+    grid_.inverse_depth[lane] = fits[lane]->inverse_depth;
+  }
+  cross_grid(frame, width_, height_, grid_);
+  for (std::size_t lane = 0; lane < fits.size(); ++lane) {
+    SequenceFit& fit = *fits[lane];
+    if (fit.attempts > 0) continue;
+    fit.found = false;
+    fit.moved = 0;
+    fit.along_rows = grid_.along_rows[lane] > 0;
+    // What is not known has no crossing in the picture.
+    fit.first = grid_.known[lane] > 0 ? grid_.first[lane] : -10;
+    fit.at_first = grid_.at_first[lane];
+    fit.slope = grid_.slope[lane];
+    fit.depth_at_first = grid_.depth_at_first[lane];
+    fit.step = grid_.step[lane];
+  }
+}
+
+void SequenceFitter::spread(std::span<const SequenceFit* const> fits) {
+  for (std::size_t lane = 0; lane < fits.size(); ++lane) {
+    grid_.along_rows[lane] = fits[lane]->along_rows ? 1 : 0;
+    grid_.at_first[lane] = fits[lane]->at_first;
+    grid_.slope[lane] = fits[lane]->slope;
+  }
+  spread_crossings(width_, height_, grid_);
+}
+
+/// The pixels around a fit's crossings, where they have sequences.
+SequenceFitter::Loaded SequenceFitter::load(const SequenceFit& fit, std::size_t lane) const {
+  const int length = fit.along_rows ? width_ : height_, last = (fit.along_rows ? height_ : width_) - 1;
+  const bool along_lines = fit.along_rows == to_arrays_.along_rows;
+  const int first = static_cast<int>(fit.first);
+  const std::int32_t* low = &grid_.low[lane * crossings];
+  Loaded loaded;
+  loaded.crossings.share = &grid_.share[lane * crossings];
+  const bool is_even = low[0] == low[1] && low[0] == low[2] && low[0] == low[3] && low[0] < last;
+  if (along_lines && is_even && first >= 0 && first + static_cast<int>(crossings) <= length) {
+    const std::int32_t pixel = to_arrays_.index(low[0], first);
+    if (to_.are_known(pixel) && to_.are_known(pixel + to_arrays_.stride)) {
+      loaded.crossings.are_neighbours = true;
+      loaded.crossings.low[0] = to_arrays_.sequence(low[0], first);
+      loaded.crossings.high[0] = to_arrays_.sequence(low[0] + 1, first);
+      loaded.usable.fill(true);
+      for (std::size_t k = 0; k < crossings; ++k) loaded.pixels[k] = pixel + static_cast<std::int32_t>(k);
+      return loaded;
     }
-    waiting_.swap(moved_);
+  }
+  loaded.crossings.are_neighbours = false;
+  for (std::size_t k = 0; k < crossings; ++k) {
+    const int main = first + static_cast<int>(k);
+    const bool inside = main >= 0 && main < length, is_last = low[k] >= last;
+    const int line = !inside ? 0 : along_lines ? low[k] : main, place = !inside ? 0 : along_lines ? main : low[k];
+    const int next_line = line + (along_lines && inside && !is_last ? 1 : 0);
+    const int next_place = place + (!along_lines && inside && !is_last ? 1 : 0);
+    loaded.pixels[k] = to_arrays_.index(line, place);
+    loaded.usable[k] = inside && to_.status(loaded.pixels[k]) == PixelStatus::ok &&
+                       to_.status(to_arrays_.index(next_line, next_place)) == PixelStatus::ok;
+    loaded.crossings.low[k] = to_arrays_.sequence(line, place);
+    loaded.crossings.high[k] = to_arrays_.sequence(next_line, next_place);
+  }
+  return loaded;
+}
+
+/// Enters the products of pixels' sequences and those around their places.
+void SequenceFitter::multiply_all(std::span<SequenceFit* const> fits) {
+  batch_.count = fits.size();
+  batch_.noise_share = grid_.noise_share;
+  for (std::size_t lane = 0; lane < fits.size(); ++lane) {
+    const SequenceFit& fit = *fits[lane];
+    const Loaded loaded = load(fit, lane);
+    const CrossingProducts products = multiply(to_arrays_, loaded.crossings, fit.own.pairs);
+    batch_.gg[lane] = static_cast<float>(fit.own.square);
+    for (std::size_t i = 0; i < crossings; ++i) {
+      batch_.usable[i][lane] = loaded.usable[i] ? 1 : 0;
+      batch_.gs[i][lane] = static_cast<float>(products.gs[i]);
+      for (std::size_t j = i; j < crossings; ++j) batch_.ss[i][j][lane] = static_cast<float>(products.ss[i][j]);
+    }
   }
 }
 
-/// Enters the products of a pixel's sequence and those around its place.
-void SequenceFitter::load(SequenceFit& fit, std::size_t lane) {
-  if (fit.moved == 0 && !place_crossings(fit)) return;
-  interpolate(fit, lane);
-  const CrossingProducts products = multiply(fit.crossings.data(), from_.sequence(fit.x, fit.y), to_arrays_.length);
-  batch_.gg[lane] = products.gg;
-  for (std::size_t i = 0; i < crossings; ++i) {
-    batch_.gs[i][lane] = products.gs[i];
-    for (std::size_t j = i; j < crossings; ++j) batch_.ss[i][j][lane] = products.ss[i][j];
-  }
-}
-
-/// The curve's tangent at a place, and where it crosses the grid around. Over three pixels no lens bends the curve by
-/// more than a thousandth of a pixel.
-bool SequenceFitter::place_crossings(SequenceFit& fit) const {
-  const auto here = fit.curve->tangent(fit.inverse_depth);
-  if (!here) return false;
-  fit.along_rows = std::abs(here->change.x()) >= std::abs(here->change.y());
-  const int main = fit.along_rows ? 0 : 1;
-  if (here->change[main] == 0) return false;
-  fit.step = 1 / here->change[main];
-  fit.slope = here->change[1 - main] * fit.step;
-  fit.first = static_cast<int>(std::floor(here->pixel[main])) - 1;
-  const double back = fit.first - here->pixel[main];
-  fit.at_first = here->pixel[1 - main] + back * fit.slope;
-  fit.depth_at_first = fit.inverse_depth + back * fit.step;
-  return true;
-}
-
-/// The sequences at the crossings, where the pixels beside them have some.
-void SequenceFitter::interpolate(SequenceFit& fit, std::size_t lane) {
-  constexpr double one_share = 32768;  // see Crossing
-  const int width = to_.width(), height = to_.height();
-  const int length = fit.along_rows ? width : height, breadth = fit.along_rows ? height : width;
-  const int step = fit.along_rows ? 1 : width, step_across = fit.along_rows ? width : 1;
-  const double last = breadth - 1;
-  double position = fit.at_first;
-  for (std::size_t k = 0; k < crossings; ++k, position += fit.slope) {
-    const double across = std::min(std::max(position, 0.0), last);
-    const int main = fit.first + static_cast<int>(k), low = static_cast<int>(across);
-    const double share = across - low;
-    const std::int32_t pixel = main * step + low * step_across;
-    const std::int32_t next = low < breadth - 1 ? pixel + step_across : pixel;
-    const bool usable =
-        main >= 0 && main < length && to_.status(pixel) == PixelStatus::ok && to_.status(next) == PixelStatus::ok;
-    fit.crossed[k] = usable ? pixel : to_arrays_.nowhere();
-    fit.crossings[k] = {to_arrays_.sequence(fit.crossed[k]), to_arrays_.sequence(usable ? next : fit.crossed[k]),
-                        static_cast<std::int16_t>(std::min(one_share * share + 0.5, one_share - 1))};
-    fit.noise_share[k] = (1 - share) * (1 - share) + share * share;
-    batch_.noise_share[k][lane] = fit.noise_share[k];
-    batch_.usable[k][lane] = usable ? 1 : 0;
-  }
-}
-
-/// \return whether the least lies beyond the crossings, which were moved
-bool SequenceFitter::take(std::size_t lane, SequenceFit& fit) const {
+/// Takes a fit's results. \return false if the least lies beyond the crossings, which were moved
+bool SequenceFitter::arrives(std::size_t lane, SequenceFit& fit) const {
+  constexpr int most_attempts = 6;
+  ++fit.attempts;
   fit.share = batch_.share[lane];
-  if (std::isnan(fit.share)) return false;
+  if (std::isnan(fit.share)) return true;
   const int direction = fit.share <= 0 ? -1 : fit.share >= 1 ? 1 : 0;
   // A least between two segments, at the crossing itself, is where it is.
   if (direction != 0 && direction != -fit.moved) {
-    if (!(batch_.usable[direction < 0 ? 0 : crossings - 1][lane] > 0)) return false;
+    const bool is_border = !(batch_.usable[direction < 0 ? 0 : crossings - 1][lane] > 0);
+    if (is_border || fit.attempts == most_attempts) return true;
     fit.moved = direction;
     fit.first += direction;
     fit.at_first += direction * fit.slope;
     fit.depth_at_first += direction * fit.step;
-    return true;
+    return false;
   }
   const double place = 1 + fit.share, along = fit.first + place, across = fit.at_first + place * fit.slope;
   fit.inverse_depth = fit.depth_at_first + place * fit.step;
@@ -121,43 +155,50 @@ bool SequenceFitter::take(std::size_t lane, SequenceFit& fit) const {
   fit.is_cubic = batch_.is_cubic[lane] > 0;
   fit.gain = batch_.gain[lane];
   fit.doubt = batch_.doubt[lane];
-  fit.noise_variance = batch_.noise_variance[lane];
-  const CrossingWeights weights = weights_of(fit);
-  double change = 0;
-  for (std::size_t k = 0; k < crossings; ++k) change += weights.change[k] * batch_.gs[k][lane];
-  fit.change_along_own = fit.gain * change / batch_.gg[lane];
+  fit.change_squared = batch_.change_squared[lane];
+  fit.change_along_own = batch_.change_along_own[lane];
+  fit.least_sigma_px = std::sqrt(1 + fit.slope * fit.slope) * batch_.sigma[lane];
   fit.found = true;
-  return false;
+  return true;
 }
 
-/// Residuals r and changes d of the frames give the standard deviation twice: as in any least squares,
-/// sqrt(mean r^2 / sum d^2), and without the belief that residuals are alike in all frames, sqrt(sum r^2 d^2) / sum
-/// d^2. The second is larger where the sequences differ just where they change, as beside clipped stripes; the larger
-/// one counts.
-double SequenceFitter::sigma_px(const SequenceFit& fit) const {
-  const CrossingWeights weights = weights_of(fit);
-  Mixture mixture{fit.crossings.data(), {}, {}, 0};
-  double rounding_variance = from_.rounding_variance(fit.x, fit.y), change_noise = 0;
-  for (std::size_t k = 0; k < crossings; ++k) {
-    const double value = fit.gain * weights.value[k], change = fit.gain * weights.change[k];
-    mixture.value[k] = static_cast<float>(value);
-    mixture.change[k] = static_cast<float>(change);
-    if (fit.crossed[k] == to_arrays_.nowhere()) continue;
-    rounding_variance += value * value * fit.noise_share[k] * to_.rounding_variance(fit.crossed[k]);
-    change_noise += change * change * fit.noise_share[k];
+void SequenceFitter::find_sigmas(std::span<const SequenceFit* const> fits, std::span<double> sigmas_px) {
+  spread(fits);
+  for (std::size_t lane = 0; lane < fits.size(); ++lane) {
+    const SequenceFit& fit = *fits[lane];
+    const Loaded loaded = load(fit, lane);
+    const CrossingWeights weights = weights_of(fit);
+    double rounding_variance = from_.rounding_variance(fit.index);
+    for (std::size_t k = 0; k < crossings; ++k) {
+      const double value = fit.gain * weights.value[k];
+      mixtures_.value[k][lane] = static_cast<float>(value);
+      mixtures_.change[k][lane] = static_cast<float>(fit.gain * weights.change[k]);
+      if (loaded.usable[k])
+        rounding_variance += value * value * grid_.noise_share[k][lane] * to_.rounding_variance(loaded.pixels[k]);
+    }
+    // What a change of gain would do just as well is no change.
+    mixtures_.change_of_own[lane] = static_cast<float>(-fit.change_along_own);
+    enter(to_arrays_, loaded.crossings, fit.own.pairs, lane, mixtures_);
+    sigmas_px[lane] = rounding_variance;
   }
-  // What a change of gain would do just as well is no change.
-  if (affine_) mixture.change_of_own = static_cast<float>(-fit.change_along_own);
-  const ResidualSums sums = sum_residuals(mixture, from_.sequence(fit.x, fit.y), to_arrays_.length);
-  // Rounding is there even where clipping hides all other noise.
-  const double noise = sums.rr / batch_.freedom + rounding_variance;
-  const double weighted = sums.rrdd * batch_.samples / batch_.freedom;
-  // Noise of the crossings looks like change; only what exceeds it, and its chi-squared scatter, is known to be change.
-  const double noise_energy = fit.noise_variance * change_noise * batch_.samples;
-  const double change_squared = sums.dd - noise_energy * (1 + 3 * std::sqrt(2 / batch_.samples));
-  if (!(change_squared > 0)) return std::numeric_limits<double>::infinity();
-  const double variance = std::max(noise, weighted / change_squared) / change_squared;  // [crossings^2]
-  return std::sqrt((1 + fit.slope * fit.slope) * (variance + fit.doubt * fit.doubt));
+  sum_weighted_residuals(to_arrays_.pairs, mixtures_);
+  for (std::size_t lane = 0; lane < fits.size(); ++lane) {
+    const SequenceFit& fit = *fits[lane];
+    const double variance = fit.change_squared > 0 ? variance_of(fit, sigmas_px[lane], mixtures_.rrdd[lane])
+                                                   : std::numeric_limits<double>::infinity();
+    sigmas_px[lane] = std::sqrt((1 + fit.slope * fit.slope) * (variance + fit.doubt * fit.doubt));
+  }
+}
+
+/// Residuals r and changes d of the frames give the variance [crossings^2] twice: as in any least squares,
+/// mean r^2 / sum d^2, and without the belief that residuals are alike in all frames, sum r^2 d^2 / (sum d^2)^2. The
+/// second is larger where the sequences differ just where they change, as beside clipped stripes; the larger one
+/// counts.
+/// \param rounding  variance of a sample, which is there even where clipping hides all other noise
+double SequenceFitter::variance_of(const SequenceFit& fit, double rounding, double rrdd) const {
+  const double alike = fit.distance_squared / batch_.freedom + rounding;
+  const double weighted = rrdd * batch_.samples / batch_.freedom;
+  return std::max(alike, weighted / fit.change_squared) / fit.change_squared;
 }
 
 }  // namespace pagesweep

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
-#include <limits>
-#include <utility>
 
 #include "pagesweep/matching/sequence_kernels_internal.h"
 
@@ -22,241 +18,207 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Floats = hn::CappedTag<float, score_padding>;
 using Integers = hn::RebindToSigned<Floats>;
-/// Half of the longest vector: what the additions gain from more lanes, adding those up takes.
-using Samples = hn::CappedTag<std::int16_t, sequence_padding / 2>;
-using Sums = hn::RepartitionToWide<Samples>;
 using FloatVector = hn::Vec<Floats>;
 using IntegerVector = hn::Vec<Integers>;
-using SampleVector = hn::Vec<Samples>;
-using SumVector = hn::Vec<Sums>;
-constexpr int samples_at_once = hn::MaxLanes(Samples());
-constexpr int scores_at_once = hn::MaxLanes(Integers());
-static_assert(score_padding % 4 == 0);
+constexpr int lanes = hn::MaxLanes(Integers());
 
 FloatVector set(float value) { return hn::Set(Floats(), value); }
 
-/// Partial sums of scalar products.
-HWY_INLINE SumVector add_product(SampleVector a, SampleVector b, SumVector sum) {
-  SumVector more = hn::Zero(Sums());
-  sum = hn::ReorderWidenMulAccumulate(Sums(), a, b, sum, more);
-  return hn::Add(sum, more);
-}
-
-/// Adds up the lanes of four vectors.
 #if HWY_TARGET == HWY_SCALAR
-HWY_INLINE void store_totals(SumVector a, SumVector b, SumVector c, SumVector d, std::int32_t* out) {
-  const SumVector totals[] = {a, b, c, d};
-  for (int k = 0; k < 4; ++k) out[k] = hn::GetLane(totals[k]);
-}
-#else
-using Block = hn::Full128<std::int32_t>;
-HWY_INLINE hn::Vec<Block> add_blocks(hn::Vec<Block> v) { return v; }
-template <class V>
-HWY_INLINE hn::Vec<Block> add_blocks(V v) {
-  const hn::Half<hn::DFromV<V> > half;
-  return add_blocks(hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
-}
-
-/// Within blocks of four lanes first, then block by block.
-HWY_INLINE void store_totals(SumVector a, SumVector b, SumVector c, SumVector d, std::int32_t* out) {
-  const Sums tag;
-  const hn::Repartition<std::int64_t, Sums> pairs;
-  const SumVector ab = hn::Add(hn::InterleaveLower(tag, a, b), hn::InterleaveUpper(tag, a, b));
-  const SumVector cd = hn::Add(hn::InterleaveLower(tag, c, d), hn::InterleaveUpper(tag, c, d));
-  const auto p = hn::BitCast(pairs, ab), q = hn::BitCast(pairs, cd);
-  const SumVector totals =
-      hn::Add(hn::BitCast(tag, hn::InterleaveLower(pairs, p, q)), hn::BitCast(tag, hn::InterleaveUpper(pairs, p, q)));
-  hn::StoreU(add_blocks(totals), Block(), out);
-}
-#endif
-
-constexpr int with_padding(int count) { return (count + score_padding - 1) / score_padding * score_padding; }
-
-/// The pixels nearest to a curve's places.
-void find_pixels(const SequenceArrays& to, const LensNumbers& lens, const CurveLine& line, std::int32_t* pixels) {
-  const Integers integers;
-  const FloatVector last_column = set(static_cast<float>(to.width - 1)),
-                    last_row = set(static_cast<float>(to.height - 1));
-  const FloatVector half = set(0.5f), zero = hn::Zero(Floats());
-  const auto inside = [&](FloatVector p, FloatVector last) {
-    return hn::And(hn::Ge(p, hn::Neg(half)), hn::Le(p, hn::Add(last, half)));
-  };
-  const auto nearest = [&](FloatVector p, FloatVector last) { return hn::NearestInt(hn::Min(hn::Max(p, zero), last)); };
-  alignas(64) static constexpr float ahead[score_padding] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-  const FloatVector first = hn::Load(Floats(), ahead);
-  for (int k = 0; k < with_padding(line.count); k += scores_at_once) {
-    const FloatVector step = hn::Add(first, set(static_cast<float>(k)));
-    const FloatVector x = hn::MulAdd(step, set(line.dx), set(line.x)), y = hn::MulAdd(step, set(line.dy), set(line.y));
-    const FloatVector xx = hn::Mul(x, x), yy = hn::Mul(y, y), rr = hn::Add(xx, yy);
-    const FloatVector xy2 = hn::Mul(set(2), hn::Mul(x, y));
-    const FloatVector radial =
-        hn::MulAdd(rr, hn::MulAdd(rr, hn::MulAdd(rr, set(lens.k3), set(lens.k2)), set(lens.k1)), set(1));
-    const FloatVector tangent_x = hn::MulAdd(set(lens.p1), xy2, hn::Mul(set(lens.p2), hn::MulAdd(set(2), xx, rr)));
-    const FloatVector tangent_y = hn::MulAdd(set(lens.p2), xy2, hn::Mul(set(lens.p1), hn::MulAdd(set(2), yy, rr)));
-    const FloatVector u = hn::MulAdd(set(lens.fx), hn::MulAdd(x, radial, tangent_x), set(lens.cx));
-    const FloatVector v = hn::MulAdd(set(lens.fy), hn::MulAdd(y, radial, tangent_y), set(lens.cy));
-    const auto seen =
-        hn::And(hn::And(inside(u, last_column), inside(v, last_row)),
-                hn::And(hn::Le(rr, set(lens.max_radius_squared)), hn::Lt(step, set(static_cast<float>(line.count)))));
-    const IntegerVector pixel =
-        hn::Add(hn::Mul(nearest(v, last_row), hn::Set(integers, to.width)), nearest(u, last_column));
-    hn::StoreU(hn::IfThenElse(hn::RebindMask(integers, seen), pixel, hn::Set(integers, to.nowhere())), integers,
-               pixels + k);
-  }
-}
-
-HWY_INLINE SumVector product(const std::int16_t* a, const std::int16_t* b, int length) {
-  const Samples samples;
-  SumVector sum = hn::Zero(Sums());
-  for (int i = 0; i < length; i += sequence_padding)
-    for (int k = 0; k < sequence_padding; k += samples_at_once)
-      sum = add_product(hn::LoadU(samples, a + i + k), hn::LoadU(samples, b + i + k), sum);
-  return sum;
-}
-
-/// Scalar products with the sequences of some pixels, a multiple of 4. \tparam IsShort  they have one part only
-template <bool IsShort>
-HWY_INLINE void multiply_all(const SequenceArrays& to, const std::int16_t* own, const std::int32_t* pixels, int count,
-                             std::int32_t* products) {
-  const int length = IsShort ? sequence_padding : to.length;
-  const auto with = [&](int k) {
-    return product(own, to.data + static_cast<std::ptrdiff_t>(pixels[k]) * length, length);
-  };
-  for (int k = 0; k < count; k += 4) store_totals(with(k), with(k + 1), with(k + 2), with(k + 3), products + k);
-}
-
-std::int32_t ScoreCurve(const SequenceArrays& to, const LensNumbers& lens, const CurveLine& line,
-                        const std::int16_t* own, std::int32_t own_square, std::int32_t* pixels, std::int32_t* scores) {
-  find_pixels(to, lens, line, pixels);
-  const Integers integers;
-  const int count = with_padding(line.count);
-  if (to.length == sequence_padding) {
-    multiply_all<true>(to, own, pixels, count, scores);
-  } else {
-    multiply_all<false>(to, own, pixels, count, scores);
-  }
-  IntegerVector least = hn::Set(integers, std::numeric_limits<std::int32_t>::max());
-  for (int k = 0; k < count; k += scores_at_once) {
-    const IntegerVector squares = to.squares ? hn::GatherIndex(integers, to.squares, hn::LoadU(integers, pixels + k))
-                                             : hn::Set(integers, sequence_scale * sequence_scale);
-    const IntegerVector twice = hn::ShiftLeft<1>(hn::LoadU(integers, scores + k));
-    const IntegerVector score = hn::Sub(hn::Add(squares, hn::Set(integers, own_square)), twice);
-    least = hn::Min(least, score);
-    hn::StoreU(score, integers, scores + k);
-  }
-  return hn::GetLane(hn::MinOfLanes(integers, least));
-}
-
-/// How near a sequence g comes to the line from S_0 to S_1, all by their scalar products.
-/// \return share of the way, and distance
-std::pair<float, float> nearest_on_line(float gg, float g0, float g1, float s0, float s1, float s01, bool affine) {
-  const float a = g0 * s1 - g1 * s01, b = g1 * s0 - g0 * s01, length_squared = s0 - 2 * s01 + s1;
-  float share = 0;
-  if (affine && a + b > 0) share = b / (a + b);
-  if (!affine && length_squared > 0) share = (g1 - g0 + s0 - s01) / length_squared;
-  share = std::clamp(share, 0.0f, 1.0f);
-  const float gs = g0 + share * (g1 - g0), ss = s0 + share * (2 * (s01 - s0) + share * length_squared);
-  const float distance_squared = affine ? (gs > 0 && ss > 0 ? gg - gs * gs / ss : gg) : gg - 2 * gs + ss;
-  return {share, distance_squared};
-}
-
-/// A minimum of the scores, improved.
-CurveMinimum improve(const ScoredCurve& curve, int k) {
-  const SequenceArrays& to = *curve.to;
-  const auto square = [&](std::int32_t pixel) {
-    return static_cast<float>(to.squares ? to.squares[pixel] : sequence_scale * sequence_scale);
-  };
-  const int neighbour = curve.scores[k - 1] < curve.scores[k + 1] ? k - 1 : k + 1;
-  CurveMinimum best{static_cast<float>(k), static_cast<float>(curve.scores[k])};
-  if (neighbour < 0 || neighbour >= curve.count) return best;
-  const std::int32_t here = curve.pixels[k], there = curve.pixels[neighbour];
-  if (here == there || there == to.nowhere()) return best;
-  const SumVector lanes = product(to.sequence(here), to.sequence(there), to.length);
-  const auto gg = static_cast<float>(curve.own_square), s0 = square(here), s1 = square(there);
-  const float g0 = 0.5f * (gg + s0 - static_cast<float>(curve.scores[k]));
-  const float g1 = 0.5f * (gg + s1 - static_cast<float>(curve.scores[neighbour]));
-  const auto s01 = static_cast<float>(hn::GetLane(hn::SumOfLanes(Sums(), lanes)));
-  const auto [share, distance_squared] = nearest_on_line(gg, g0, g1, s0, s1, s01, curve.affine);
-  return {static_cast<float>(k) + share * static_cast<float>(neighbour - k), distance_squared};
-}
-
-int FindMinima(const ScoredCurve& curve, std::int32_t limit, CurveMinimum* minima) {
-  const Integers integers;
-  int found = 0;
-  for (int first = 0; first < curve.count; first += scores_at_once) {
-    const std::int32_t* scores = curve.scores + first;
-    const IntegerVector here = hn::LoadU(integers, scores);
-    const IntegerVector before = hn::LoadU(integers, scores - 1), behind = hn::LoadU(integers, scores + 1);
-    const auto too_large = hn::Or(hn::Gt(here, hn::Set(integers, limit)), hn::Gt(here, behind));
-    const auto is_minimum = hn::AndNot(too_large, hn::Lt(here, before));
-    if (hn::AllFalse(integers, is_minimum)) continue;
-    std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(integers, is_minimum, bytes);
-    for (unsigned bits = bytes[0] | static_cast<unsigned>(bytes[1]) << 8; bits != 0; bits &= bits - 1) {
-      const int place = first + std::countr_zero(bits);
-      minima[found++] = {static_cast<float>(place), static_cast<float>(curve.scores[place])};
+void MultiplyNeighbours(const SequenceArrays& arrays, int line, std::int32_t* own, std::int32_t* next) {
+  for (int k = 0; k < arrays.places; ++k) {
+    const std::int32_t* pair = arrays.sequence(line, k);
+    own[k] = next[k] = 0;
+    for (int j = 0; j < arrays.pairs; ++j, pair += arrays.stride) {
+      own[k] += multiply_pairs(pair[0], pair[0]);
+      next[k] += multiply_pairs(pair[0], pair[1]);
     }
   }
-  return found;
 }
 
-void ImproveMinima(const ScoredCurve& curve, std::span<CurveMinimum> minima) {
-  for (CurveMinimum& minimum : minima) minimum = improve(curve, static_cast<int>(minimum.place));
+/// The j-th pair of a crossing.
+std::int32_t interpolate(const SequenceArrays& to, const Crossings& crossings, std::size_t k, int j) {
+  const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(j) * to.stride;
+  std::int16_t low[2], high[2];
+  hwy::CopyBytes<4>(crossings.low[k] + at, low);
+  hwy::CopyBytes<4>(crossings.high[k] + at, high);
+  for (int i = 0; i < 2; ++i)
+    low[i] =
+        static_cast<std::int16_t>(low[i] + (((high[i] - low[i]) * (crossings.share[k] & 0x7fff) + (1 << 14)) >> 15));
+  std::int32_t pair;
+  hwy::CopyBytes<4>(low, &pair);
+  return pair;
 }
 
-template <class D>
-HWY_INLINE hn::Vec<D> between(D d, const Crossing& crossing, int i) {
-  const auto low = hn::LoadU(d, crossing.low + i), high = hn::LoadU(d, crossing.high + i);
-  return hn::Add(low, hn::MulFixedPoint15(hn::Sub(high, low), hn::Set(d, crossing.share)));
-}
-
-CrossingProducts Multiply(const Crossing* crossings, const std::int16_t* own, int length) {
-  constexpr int count = CrossingProducts::crossings, sums = 1 + count + count * (count + 1) / 2;
-  SumVector sum[sums + 1];
-  HWY_UNROLL(16)
-  for (int k = 0; k <= sums; ++k) sum[k] = hn::Zero(Sums());
-  for (int i = 0; i < length; i += samples_at_once) {
-    SampleVector s[1 + count] = {hn::LoadU(Samples(), own + i)};  // g, S_0, S_1, ...
-    HWY_UNROLL(4)
-    for (int k = 0; k < count; ++k) s[1 + k] = between(Samples(), crossings[k], i);
-    int k = 0;
-    HWY_UNROLL(5)
-    for (int a = 0; a <= count; ++a) sum[k] = add_product(s[0], s[a], sum[k]), ++k;
-    HWY_UNROLL(4)
-    for (int a = 1; a <= count; ++a) HWY_UNROLL(4)
-    for (int b = a; b <= count; ++b) sum[k] = add_product(s[a], s[b], sum[k]), ++k;
-  }
-  alignas(64) std::int32_t totals[sums + 1];
-  HWY_UNROLL(4)
-  for (int k = 0; k < sums; k += 4) store_totals(sum[k], sum[k + 1], sum[k + 2], sum[k + 3], totals + k);
-  CrossingProducts products{totals[0], {totals[1], totals[2], totals[3], totals[4]}, {}};
-  int k = 1 + count;
-  for (int a = 0; a < count; ++a)
-    for (int b = a; b < count; ++b) products.ss[a][b] = totals[k++];
+CrossingProducts Multiply(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own) {
+  CrossingProducts products{};
+  for (int j = 0; j < to.pairs; ++j)
+    for (std::size_t a = 0; a < Crossings::count; ++a) {
+      const std::int32_t s = interpolate(to, crossings, a, j);
+      products.gs[a] += multiply_pairs(s, own[j]);
+      for (std::size_t b = a; b < Crossings::count; ++b)
+        products.ss[a][b] += multiply_pairs(s, interpolate(to, crossings, b, j));
+    }
   return products;
 }
 
-ResidualSums SumResiduals(const Mixture& mixture, const std::int16_t* own, int length) {
-  const Floats floats;
-  const hn::Rebind<std::int16_t, Floats> samples;
-  const auto to_floats = [&](auto s) { return hn::ConvertTo(floats, hn::PromoteTo(Integers(), s)); };
-  FloatVector rr = hn::Zero(floats), dd = rr, rrdd = rr;
-  for (int i = 0; i < length; i += static_cast<int>(hn::Lanes(floats))) {
-    const FloatVector g = to_floats(hn::LoadU(samples, own + i));
-    FloatVector r = g, d = hn::Mul(g, set(mixture.change_of_own));
-    HWY_UNROLL(4)
-    for (int k = 0; k < 4; ++k) {
-      const FloatVector s = to_floats(between(samples, mixture.crossings[k], i));
-      r = hn::NegMulAdd(s, set(mixture.value[k]), r);
-      d = hn::MulAdd(s, set(mixture.change[k]), d);
+void Enter(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own, std::size_t pixel,
+           MixtureBatch& batch) {
+  for (int j = 0; j < to.pairs; ++j) {
+    const std::size_t at = static_cast<std::size_t>(j) * MixtureBatch::most + pixel;
+    batch.own[at] = own[j];
+    for (std::size_t k = 0; k < Crossings::count; ++k)
+      batch.crossings[at * Crossings::count + k] = interpolate(to, crossings, k, j);
+  }
+}
+#else
+/// Sums of products of pairs.
+template <class D>
+class PairSums {
+ public:
+  using Vector = hn::Vec<D>;
+
+  HWY_INLINE PairSums() : sum_(hn::Zero(D())), more_(sum_) {}
+  HWY_INLINE void add(Vector a, Vector b) {
+    const hn::Repartition<std::int16_t, D> samples;
+    sum_ = hn::ReorderWidenMulAccumulate(D(), hn::BitCast(samples, a), hn::BitCast(samples, b), sum_, more_);
+  }
+  HWY_INLINE Vector total() const { return hn::RearrangeToOddPlusEven(sum_, more_); }
+
+ private:
+  Vector sum_, more_;
+};
+
+/// The four crossings of one pixel, side by side.
+class CrossingReader {
+ public:
+  using Tag = hn::Full128<std::int32_t>;
+  using Vector = hn::Vec<Tag>;
+
+  CrossingReader(const SequenceArrays& to, const Crossings& crossings)
+      : crossings_(crossings), stride_(to.stride), share_(hn::BitCast(samples, hn::LoadU(Tag(), crossings.share))) {}
+
+  /// The j-th pair of each, interpolated.
+  HWY_INLINE Vector read(int j) const {
+    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(j) * stride_;
+    const auto low = hn::BitCast(samples, load(crossings_.low, at));
+    const auto high = hn::BitCast(samples, load(crossings_.high, at));
+    return hn::BitCast(Tag(), hn::Add(low, hn::MulFixedPoint15(hn::Sub(high, low), share_)));
+  }
+
+ private:
+  static constexpr hn::Full128<std::int16_t> samples{};
+
+  HWY_INLINE Vector load(const std::array<const std::int32_t*, Crossings::count>& places, std::ptrdiff_t at) const {
+    if (crossings_.are_neighbours) return hn::LoadU(Tag(), places[0] + at);
+    alignas(16) const std::int32_t pairs[] = {places[0][at], places[1][at], places[2][at], places[3][at]};
+    return hn::Load(Tag(), pairs);
+  }
+
+  const Crossings& crossings_;
+  int stride_;
+  hn::Vec<hn::Full128<std::int16_t> > share_;
+};
+
+void MultiplyNeighbours(const SequenceArrays& arrays, int line, std::int32_t* own, std::int32_t* next) {
+  const Integers tag;
+  for (int k = 0; k < arrays.places; k += lanes) {
+    PairSums<Integers> with_own, with_next;
+    const std::int32_t* pair = arrays.sequence(line, k);
+    for (int j = 0; j < arrays.pairs; ++j, pair += arrays.stride) {
+      const IntegerVector here = hn::LoadU(tag, pair);
+      with_own.add(here, here);
+      with_next.add(here, hn::LoadU(tag, pair + 1));
+    }
+    hn::StoreU(with_own.total(), tag, own + k);
+    hn::StoreU(with_next.total(), tag, next + k);
+  }
+}
+
+CrossingProducts Multiply(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own) {
+  using Tag = CrossingReader::Tag;
+  const CrossingReader reader(to, crossings);
+  PairSums<Tag> with_own, with_same, with_next, with_second;
+  for (int j = 0; j < to.pairs; ++j) {
+    const auto s = reader.read(j);
+    with_own.add(s, hn::Set(Tag(), own[j]));
+    with_same.add(s, s);
+    with_next.add(s, hn::Shuffle0321(s));
+    with_second.add(s, hn::Shuffle1032(s));
+  }
+  alignas(16) std::int32_t same[4], next[4], second[4];
+  CrossingProducts products{};
+  hn::StoreU(with_own.total(), Tag(), products.gs);
+  hn::Store(with_same.total(), Tag(), same);
+  hn::Store(with_next.total(), Tag(), next);
+  hn::Store(with_second.total(), Tag(), second);
+  for (int k = 0; k < 4; ++k) products.ss[k][k] = same[k];
+  for (int k = 0; k < 3; ++k) products.ss[k][k + 1] = next[k];
+  for (int k = 0; k < 2; ++k) products.ss[k][k + 2] = second[k];
+  products.ss[0][3] = next[3];
+  return products;
+}
+
+void Enter(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own, std::size_t pixel,
+           MixtureBatch& batch) {
+  const CrossingReader reader(to, crossings);
+  std::int32_t* out = batch.crossings.data() + pixel * Crossings::count;
+  for (int j = 0; j < to.pairs; ++j, out += MixtureBatch::most * Crossings::count) {
+    hn::StoreU(reader.read(j), CrossingReader::Tag(), out);
+    batch.own[static_cast<std::size_t>(j) * MixtureBatch::most + pixel] = own[j];
+  }
+}
+#endif
+
+/// The sums of some pixels.
+class Residuals {
+ public:
+  Residuals(const MixtureBatch& batch, std::size_t first) : batch_(batch), first_(first) {
+    for (std::size_t k = 0; k < Crossings::count; ++k) {
+      value_[k] = hn::Load(Floats(), &batch.value[k][first]);
+      change_[k] = hn::Load(Floats(), &batch.change[k][first]);
+    }
+    change_of_own_ = hn::Load(Floats(), &batch.change_of_own[first]);
+  }
+
+  void add(std::size_t pair) {
+    const Integers tag;
+    const std::size_t at = pair * MixtureBatch::most + first_;
+    const IntegerVector own = hn::LoadU(tag, batch_.own.data() + at);
+    IntegerVector s[Crossings::count];
+    hn::LoadInterleaved4(tag, batch_.crossings.data() + at * Crossings::count, s[0], s[1], s[2], s[3]);
+    add_frame([](IntegerVector v) { return hn::ShiftRight<16>(hn::ShiftLeft<16>(v)); }, own, s);
+    add_frame([](IntegerVector v) { return hn::ShiftRight<16>(v); }, own, s);
+  }
+
+  void store(MixtureBatch& out) const { hn::Store(rrdd_, Floats(), &out.rrdd[first_]); }
+
+ private:
+  template <class Half>
+  HWY_INLINE void add_frame(const Half& half, IntegerVector own, const IntegerVector* s) {
+    const FloatVector g = hn::ConvertTo(Floats(), half(own));
+    FloatVector r = g, d = hn::Mul(g, change_of_own_);
+    for (std::size_t k = 0; k < Crossings::count; ++k) {
+      const FloatVector there = hn::ConvertTo(Floats(), half(s[k]));
+      r = hn::NegMulAdd(there, value_[k], r);
+      d = hn::MulAdd(there, change_[k], d);
     }
     const FloatVector rd = hn::Mul(r, d);
-    rr = hn::MulAdd(r, r, rr);
-    dd = hn::MulAdd(d, d, dd);
-    rrdd = hn::MulAdd(rd, rd, rrdd);
+    rrdd_ = hn::MulAdd(rd, rd, rrdd_);
   }
-  const auto total = [&](FloatVector v) { return hn::GetLane(hn::SumOfLanes(floats, v)); };
-  return {total(rr), total(dd), total(rrdd)};
+
+  const MixtureBatch& batch_;
+  std::size_t first_;
+  FloatVector value_[Crossings::count], change_[Crossings::count], change_of_own_;
+  FloatVector rrdd_ = hn::Zero(Floats());
+};
+
+void SumWeightedResiduals(int pairs, MixtureBatch& batch) {
+  for (std::size_t first = 0; first < MixtureBatch::most; first += static_cast<std::size_t>(lanes)) {
+    Residuals residuals(batch, first);
+    for (int j = 0; j < pairs; ++j) residuals.add(static_cast<std::size_t>(j));
+    residuals.store(batch);
+  }
 }
 
 /// As many pixels of the rows as a vector has lanes.
@@ -290,19 +252,23 @@ class PixelColumn {
     return mean;
   }
 
-  /// Two frames at a time, which are neighbours in each pixel's sequence.
-  void pack(FloatVector offset, FloatVector scale, int length, std::int16_t* out) const {
+  /// Two frames at a time.
+  void pack(FloatVector offset, FloatVector scale, const PairPlaces& out) const {
     const auto sample = [&](std::size_t i) {
       return i < gray_.frames.size() ? hn::NearestInt(hn::Mul(hn::Sub(at(i), offset), scale)) : hn::Zero(Integers());
     };
-    const int pixels = std::min(scores_at_once, gray_.pixels - first_);
-    alignas(64) std::int32_t pairs[scores_at_once];
-    for (int i = 0; i < length; i += 2) {
-      const IntegerVector low = hn::And(sample(static_cast<std::size_t>(i)), hn::Set(Integers(), 0xffff));
-      const IntegerVector high = hn::ShiftLeft<16>(sample(static_cast<std::size_t>(i) + 1));
-      hn::Store(hn::Or(low, high), Integers(), pairs);
-      for (int p = 0; p < pixels; ++p)
-        std::memcpy(out + static_cast<std::ptrdiff_t>(first_ + p) * length + i, pairs + p, sizeof(pairs[0]));
+    const int pixels = std::min(lanes, gray_.pixels - first_);
+    std::int32_t* there = out.first + first_ * out.pixel_step;
+    alignas(64) std::int32_t pairs[lanes];
+    for (std::size_t i = 0; i < gray_.frames.size(); i += 2, there += out.pair_step) {
+      const IntegerVector low = hn::And(sample(i), hn::Set(Integers(), 0xffff)),
+                          high = hn::ShiftLeft<16>(sample(i + 1));
+      if (out.pixel_step == 1) {
+        hn::StoreU(hn::Or(low, high), Integers(), there);
+      } else {
+        hn::Store(hn::Or(low, high), Integers(), pairs);
+        for (int p = 0; p < pixels; ++p) there[p * out.pixel_step] = pairs[p];
+      }
     }
   }
 
@@ -311,17 +277,16 @@ class PixelColumn {
   int first_;
 };
 
-void PackSequences(const GrayRows& gray, bool affine, int length, std::int16_t* out,
-                   const SequenceStatistics& statistics) {
+void PackSequences(const GrayRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics) {
   const FloatVector full_size = set(gray.range * std::sqrt(static_cast<float>(gray.frames.size())));
-  for (int first = 0; first < gray.pixels; first += scores_at_once) {
+  for (int first = 0; first < gray.pixels; first += lanes) {
     const PixelColumn column(gray, first);
     FloatVector energy;
     const FloatVector mean = column.summarise(statistics, energy);
     const FloatVector size = affine ? hn::Sqrt(hn::Max(energy, set(1e-6f))) : full_size;
     const FloatVector scale = hn::Div(set(sequence_scale), size);
     hn::StoreU(scale, Floats(), statistics.scale + first);
-    column.pack(affine ? mean : hn::Zero(Floats()), scale, length, out);
+    column.pack(affine ? mean : hn::Zero(Floats()), scale, out);
   }
 }
 
@@ -333,36 +298,30 @@ HWY_AFTER_NAMESPACE();
 namespace pagesweep {
 
 HWY_EXPORT(PackSequences);
-HWY_EXPORT(ScoreCurve);
-HWY_EXPORT(FindMinima);
-HWY_EXPORT(ImproveMinima);
+HWY_EXPORT(MultiplyNeighbours);
 HWY_EXPORT(Multiply);
-HWY_EXPORT(SumResiduals);
+HWY_EXPORT(Enter);
+HWY_EXPORT(SumWeightedResiduals);
 
-void pack_sequences(const GrayRows& gray, bool affine, int length, std::int16_t* out,
-                    const SequenceStatistics& statistics) {
-  HWY_DYNAMIC_DISPATCH(PackSequences)(gray, affine, length, out, statistics);
+void pack_sequences(const GrayRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics) {
+  HWY_DYNAMIC_DISPATCH(PackSequences)(gray, affine, out, statistics);
 }
 
-std::int32_t score_curve(const SequenceArrays& to, const LensNumbers& lens, const CurveLine& line,
-                         const std::int16_t* own, std::int32_t own_square, std::int32_t* pixels, std::int32_t* scores) {
-  return HWY_DYNAMIC_DISPATCH(ScoreCurve)(to, lens, line, own, own_square, pixels, scores);
+void multiply_neighbours(const SequenceArrays& arrays, int line, std::int32_t* own, std::int32_t* next) {
+  HWY_DYNAMIC_DISPATCH(MultiplyNeighbours)(arrays, line, own, next);
 }
 
-int find_minima(const ScoredCurve& curve, std::int32_t limit, CurveMinimum* minima) {
-  return HWY_DYNAMIC_DISPATCH(FindMinima)(curve, limit, minima);
+CrossingProducts multiply(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own) {
+  return HWY_DYNAMIC_DISPATCH(Multiply)(to, crossings, own);
 }
 
-void improve_minima(const ScoredCurve& curve, std::span<CurveMinimum> minima) {
-  HWY_DYNAMIC_DISPATCH(ImproveMinima)(curve, minima);
+void enter(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own, std::size_t pixel,
+           MixtureBatch& batch) {
+  HWY_DYNAMIC_DISPATCH(Enter)(to, crossings, own, pixel, batch);
 }
 
-CrossingProducts multiply(const Crossing* crossings, const std::int16_t* own, int length) {
-  return HWY_DYNAMIC_DISPATCH(Multiply)(crossings, own, length);
-}
-
-ResidualSums sum_residuals(const Mixture& mixture, const std::int16_t* own, int length) {
-  return HWY_DYNAMIC_DISPATCH(SumResiduals)(mixture, own, length);
+void sum_weighted_residuals(int pairs, MixtureBatch& batch) {
+  HWY_DYNAMIC_DISPATCH(SumWeightedResiduals)(pairs, batch);
 }
 
 }  // namespace pagesweep

@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
-#include "pagesweep/matching/follow_curves.h"
+#include "pagesweep/matching/sequence_arrays_internal.h"
 
 namespace pagesweep {
-
-/// Stored sequences are filled up with zeros to a multiple of this: a cache line, and the longest vector.
-inline constexpr int sequence_padding = 32;
-/// Length of every stored sequence in its scalar product with itself, at most: products then fit into 32 bits.
-inline constexpr int sequence_scale = (1 << 14) - 1;
-/// Arrays that are filled whole vectors at a time have room for a multiple of this.
-inline constexpr int score_padding = 16;
 
 /// Gray values of some pixels: a row for each frame.
 struct GrayRows {
@@ -31,91 +26,51 @@ struct SequenceStatistics {
   float* scale;    ///< [1 / gray value] of the stored sequence
 };
 
-/// Stores the sequences pixel by pixel.
+/// Where sequences are stored: pair j of pixel p at first[j pair_step + p pixel_step].
+struct PairPlaces {
+  std::int32_t* first;
+  std::ptrdiff_t pair_step, pixel_step;  ///< if pixels follow each other, there is room for a multiple of score_padding
+};
+
+/// Stores some pixels' sequences, two frames in 32 bits; an odd one is followed by a 0.
 /// \param affine  the mean is removed and the length becomes sequence_scale; else `range` in all frames has that length
-/// \param out     `length` entries a pixel: those beyond the frames become 0
-void pack_sequences(const GrayRows& gray, bool affine, int length, std::int16_t* out,
-                    const SequenceStatistics& statistics);
+void pack_sequences(const GrayRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics);
 
-/// All sequences of a picture, pixel by pixel, and one of zeros behind them.
-struct SequenceArrays {
-  const std::int16_t* data;
-  const std::int32_t* squares;  ///< scalar product of each sequence with itself; null: sequence_scale^2 for all
-  int length;                   ///< of a sequence, with filling
-  int width, height;            ///< [px]
+/// Scalar products of a line's sequences with themselves and with those of their next places.
+/// \param own, next  [place] there is room for a multiple of score_padding
+void multiply_neighbours(const SequenceArrays& arrays, int line, std::int32_t* own, std::int32_t* next);
 
-  std::int32_t nowhere() const { return width * height; }
-  const std::int16_t* sequence(std::int32_t pixel) const { return data + static_cast<std::ptrdiff_t>(pixel) * length; }
-};
+/// Sequences between two pixels each.
+struct Crossings {
+  static constexpr int count = 4;
 
-/// An epipolar curve before the lens bends it, in ideal coordinates: places at (x, y) + k (dx, dy).
-struct CurveLine {
-  float x, y, dx, dy;
-  int count;
-};
-
-/// Compares a sequence with those of the pixels nearest to a curve's places.
-/// \param own       the sequence, and its scalar product with itself
-/// \param pixels    becomes the pixel of each place, nowhere() where the picture does not show it
-/// \param scores    becomes the sum of squared differences (eq. 1); that from zeros where there is nothing, and behind
-///                  the last place: a multiple of score_padding
-/// \return the least one
-std::int32_t score_curve(const SequenceArrays& to, const LensNumbers& lens, const CurveLine& line,
-                         const std::int16_t* own, std::int32_t own_square, std::int32_t* pixels, std::int32_t* scores);
-
-/// A place on a curve that may be the match.
-struct CurveMinimum {
-  float place;             ///< among those of the curve; once improved, a fraction
-  float distance_squared;  ///< there, of the nearest pixel; once improved, interpolated between the two nearest
-};
-
-/// What score_curve() found. The entry before the first score is higher than any, and those behind the last are filled
-/// up as it does.
-struct ScoredCurve {
-  const SequenceArrays* to;
-  const std::int32_t* pixels;
-  const std::int32_t* scores;
-  int count;
-  std::int32_t own_square;
-  bool affine;  ///< see Normalisation
-};
-
-/// The places whose scores are at most `limit`, lower than the one before and not higher than the one behind.
-/// \param minima  room for half of count, rounded up
-/// \return how many there are
-int find_minima(const ScoredCurve& curve, std::int32_t limit, CurveMinimum* minima);
-
-/// Interpolates linearly towards the better one of each minimum's neighbours.
-void improve_minima(const ScoredCurve& curve, std::span<CurveMinimum> minima);
-
-/// A sequence between two pixels.
-struct Crossing {
-  const std::int16_t* low;
-  const std::int16_t* high;
-  std::int16_t share;  ///< [2^-15] of `high`
+  std::array<const std::int32_t*, count> low, high;  ///< their first pairs
+  bool are_neighbours;        ///< in memory, those of `low` and those of `high`: then the first ones serve for all
+  const std::int32_t* share;  ///< of each: in both halves, the share [2^-15] of `high`
 };
 
 /// Scalar products of a sequence g and those at consecutive crossings S_i.
 struct CrossingProducts {
-  static constexpr int crossings = 4;
-
-  std::int32_t gg;                        ///< g . g
-  std::int32_t gs[crossings];             ///< g . S_i
-  std::int32_t ss[crossings][crossings];  ///< S_i . S_j, where i <= j
+  std::int32_t gs[Crossings::count];                    ///< g . S_i
+  std::int32_t ss[Crossings::count][Crossings::count];  ///< S_i . S_j, where i <= j
 };
-CrossingProducts multiply(const Crossing* crossings, const std::int16_t* own, int length);
+/// \param own  the pairs of g, one behind the other
+CrossingProducts multiply(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own);
 
-/// A sequence between four crossings, and how it changes along the curve.
-struct Mixture {
-  const Crossing* crossings;
-  float value[4], change[4];
-  float change_of_own;  ///< so much of the sequence that it is compared with is added to the change
-};
+/// Sequences between four crossings, and how they change along their curves, for some pixels.
+struct MixtureBatch {
+  static constexpr int most = 16;
+  using Each = std::array<float, most>;
 
-/// Sums over the frames of residuals r and changes d.
-struct ResidualSums {
-  float rr, dd, rrdd;
+  std::vector<std::int32_t> own;                                     ///< [pair][pixel]
+  std::vector<std::int32_t> crossings;                               ///< [pair][pixel][crossing]
+  alignas(64) std::array<Each, Crossings::count> value{}, change{};  ///< weights of the crossings
+  alignas(64) Each change_of_own{};  ///< so much of the own sequence is added to the change
+  alignas(64) Each rrdd{};           ///< sum over the frames of the squared product of residual r and change d
 };
-ResidualSums sum_residuals(const Mixture& mixture, const std::int16_t* own, int length);
+/// Enters one pixel's sequence, and those at the crossings.
+void enter(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own, std::size_t pixel,
+           MixtureBatch& batch);
+void sum_weighted_residuals(int pairs, MixtureBatch& batch);
 
 }  // namespace pagesweep

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "pagesweep/matching/sequence_kernels_internal.h"
+
 #include <gtest/gtest.h>
 
 #include <hwy/targets.h>
@@ -6,12 +8,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
-#include <numeric>
 #include <random>
 #include <vector>
 
-#include "pagesweep/matching/sequence_kernels_internal.h"
+#include "pagesweep/matching/sequence_search_internal.h"
 
 namespace pagesweep {
 namespace {
@@ -19,29 +21,45 @@ namespace {
 /// A small picture of random sequences. Parameter: their frames.
 class SequenceKernels : public testing::TestWithParam<int> {
  protected:
-  static constexpr int width = 37, height = 23;
-  const int frames = GetParam();
-  const int length = (frames + sequence_padding - 1) / sequence_padding * sequence_padding;
-  std::vector<std::int16_t> data;
+  static constexpr int width = 37, height = 23, stride = 64;
+  const int frames = GetParam(), pairs = (frames + 1) / 2;
+  std::vector<std::int32_t> data, own, next;
   std::mt19937 random{7};
 
-  SequenceKernels() : data(static_cast<std::size_t>((width * height + 1) * length)) {
+  SequenceKernels()
+      : data(static_cast<std::size_t>(height * pairs * stride)),
+        own(static_cast<std::size_t>(height * stride)),
+        next(own.size()) {
     std::uniform_int_distribution<int> sample(-2000, 2000);
-    for (int p = 0; p < width * height; ++p)
-      for (int i = 0; i < frames; ++i)
-        data[static_cast<std::size_t>(p * length + i)] = static_cast<std::int16_t>(sample(random));
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        for (int i = 0; i < frames; ++i) set(x, y, i, static_cast<std::int16_t>(sample(random)));
+    for (int y = 0; y < height; ++y)
+      multiply_neighbours(arrays(), y, &own[static_cast<std::size_t>(y * stride)],
+                          &next[static_cast<std::size_t>(y * stride)]);
   }
   ~SequenceKernels() override { hwy::SetSupportedTargetsForTest(0); }
 
-  SequenceArrays arrays(const std::int32_t* squares = nullptr) const {
-    return {data.data(), squares, length, width, height};
+  void set(int x, int y, int frame, std::int16_t value) {
+    auto* pair = reinterpret_cast<char*>(data.data() + (arrays().sequence(y, x) - data.data()) + frame / 2 * stride);
+    std::memcpy(pair + 2 * (frame % 2), &value, 2);
   }
-  std::int32_t product(const std::int16_t* a, const std::int16_t* b) const {
-    return std::inner_product(a, a + length, b, std::int32_t{0});
+  /// Lines are rows.
+  SequenceArrays arrays(bool along_rows = true) const {
+    return {data.data(), own.data(), own.data(), next.data(), pairs, stride, height, width, along_rows};
   }
-  std::vector<std::int32_t> squares() const {
+  Eigen::VectorXd sequence(std::int32_t index) const {
+    Eigen::VectorXd values(frames);
+    for (int i = 0; i < frames; ++i) {
+      const std::int32_t pair = arrays().sequence(index)[i / 2 * stride];
+      values[i] = static_cast<std::int16_t>(i % 2 == 0 ? pair : pair >> 16);
+    }
+    return values;
+  }
+  Eigen::VectorXd sequence(int x, int y) const { return sequence(arrays().index(y, x)); }
+  std::vector<std::int32_t> copy(int x, int y) const {
     std::vector<std::int32_t> result;
-    for (int p = 0; p <= width * height; ++p) result.push_back(product(arrays().sequence(p), arrays().sequence(p)));
+    for (int j = 0; j < pairs; ++j) result.push_back(arrays().sequence(y, x)[j * stride]);
     return result;
   }
 
@@ -56,135 +74,206 @@ class SequenceKernels : public testing::TestWithParam<int> {
 };
 
 const LensNumbers lens{30, 31, 18, 11, -0.05f, 0.02f, 0.001f, 0.002f, -0.001f, 4};
-const CurveLine line{-0.9f, 0.3f, 0.031f, -0.012f, 61};  // enters and leaves the picture
+const CurveFrame frame{lens, {0.9, -0.35, 0.05}, {-0.65, -0.4}, {0.65, 0.4}, -2, 2};
 
-/// Where the lens images a place of the line [px].
-Eigen::Vector2d picture_of(int place) {
-  const double x = line.x + place * static_cast<double>(line.dx), y = line.y + place * static_cast<double>(line.dy);
+/// Where the lens images ideal coordinates [px].
+Eigen::Vector2d picture_of(double x, double y) {
   const double r2 = x * x + y * y, radial = 1 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3));
   return {lens.fx * (x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x)) + lens.cx,
           lens.fy * (y * radial + lens.p1 * (r2 + 2 * y * y) + 2 * lens.p2 * x * y) + lens.cy};
 }
 
-TEST_P(SequenceKernels, ScoresAreSquaredDifferencesFromTheNearestPixels) {
-  const std::vector<std::int32_t> all_squares = squares();
-  const SequenceArrays to = arrays(all_squares.data());
-  const std::int16_t* own = to.sequence(5);
+LineBatch lines_of_some_pixels(bool along_rows) {
+  LineBatch batch;
+  for (std::size_t k = 0; k < LineBatch::most; ++k) {
+    batch.direction[0][k] = -0.3 + 0.03 * static_cast<double>(k);
+    batch.direction[1][k] = 0.2 - 0.02 * static_cast<double>(k);
+    batch.direction[2][k] = 1;
+  }
+  batch.direction[0][9] = std::numeric_limits<double>::quiet_NaN();
+  lay_lines(frame, along_rows, batch);
+  return batch;
+}
+
+TEST_P(SequenceKernels, LinesEndWhereThePictureDoesOrTheDepths) {
   on_every_target([&] {
-    std::array<std::int32_t, 64> pixels{}, scores{};
-    const std::int32_t least = score_curve(to, lens, line, own, all_squares[5], pixels.data(), scores.data());
-    int seen = 0;
-    for (int k = 0; k < line.count; ++k) {
-      const Eigen::Vector2d p = picture_of(k);
-      const bool is_seen = p.x() >= -0.5 && p.y() >= -0.5 && p.x() <= width - 0.5 && p.y() <= height - 0.5;
-      const auto pixel = pixels[static_cast<std::size_t>(k)];
-      ASSERT_EQ(pixel != to.nowhere(), is_seen) << k;
-      seen += is_seen;
-      if (is_seen) {
-        EXPECT_LE(std::abs(pixel % width - p.x()), 0.501) << k;
-        EXPECT_LE(std::abs(pixel / width - p.y()), 0.501) << k;
-      }
-      std::int64_t expected = 0;
-      for (int i = 0; i < length; ++i)
-        expected += static_cast<std::int64_t>(std::pow(own[i] - to.sequence(pixel)[i], 2));
-      EXPECT_EQ(scores[static_cast<std::size_t>(k)], expected) << k;
+    const LineBatch batch = lines_of_some_pixels(true);
+    EXPECT_EQ(batch.count[9], 0);
+    for (std::size_t k = 0; k < LineBatch::most; ++k) {
+      if (k == 9) continue;
+      ASSERT_GT(batch.count[k], 10);
+      const auto at = [&](double w) {
+        const double z = batch.direction[2][k] + w * frame.origin[2];
+        return Eigen::Vector2d((batch.direction[0][k] + w * frame.origin[0]) / z,
+                               (batch.direction[1][k] + w * frame.origin[1]) / z);
+      };
+      const double steps = batch.count[k] - 1;
+      const Eigen::Vector2d first(batch.x[k], batch.y[k]), step(batch.dx[k], batch.dy[k]);
+      EXPECT_LT((at(batch.far[k]) - first).norm(), 1e-5);
+      EXPECT_LT((at(batch.near[k]) - (first + steps * step)).norm(), 1e-5);
+      EXPECT_NEAR(Eigen::Vector2d(lens.fx * step.x(), lens.fy * step.y()).norm(), 1, 0.1);
+      for (const Eigen::Vector2d& end : {first, Eigen::Vector2d(first + steps * step)})
+        for (int i = 0; i < 2; ++i) {
+          EXPECT_GE(end[i], frame.lowest[static_cast<std::size_t>(i)] - 1e-5);
+          EXPECT_LE(end[i], frame.highest[static_cast<std::size_t>(i)] + 1e-5);
+        }
     }
-    EXPECT_GT(seen, 20);
-    EXPECT_LT(seen, line.count);
-    EXPECT_EQ(least, *std::min_element(scores.begin(), scores.end()));
   });
+}
+
+/// Across the picture's lines, none of the curves can be compared in runs.
+TEST_P(SequenceKernels, ScoresAreSquaredDifferencesFromTheNearestPixels) {
+  for (const bool along_rows : {true, false})
+    on_every_target([&] {
+      const SequenceArrays to = arrays(along_rows);
+      const std::vector<std::int32_t> g = copy(5, 1);
+      const OwnSequence own_sequence{g.data(), own[static_cast<std::size_t>(to.index(1, 5))]};
+      const LineBatch batch = lines_of_some_pixels(along_rows);
+      ScoredCurve curve;
+      for (const std::size_t k : {0U, 4U, 12U}) {
+        const CurveLine line = batch.line(k);
+        score_curve(to, lens, line, own_sequence, curve);
+        int seen = 0;
+        std::int32_t least = std::numeric_limits<std::int32_t>::max();
+        for (int entry = 0; entry < curve.count; ++entry) {
+          const std::int32_t pixel = curve.pixel_at(entry);
+          if (pixel < 0) continue;
+          ++seen;
+          const double step = curve.share_at(static_cast<float>(entry)) * (line.count - 1);
+          const Eigen::Vector2d p = picture_of(line.x + step * line.dx, line.y + step * line.dy);
+          EXPECT_LE(std::abs(pixel % stride - (along_rows ? p.x() : p.y())), 0.62) << entry;
+          EXPECT_LE(std::abs(pixel / stride - (along_rows ? p.y() : p.x())), 0.62) << entry;
+          const double expected = (sequence(5, 1) - sequence(pixel)).squaredNorm();
+          EXPECT_EQ(curve.first_score()[entry], expected) << entry;
+          least = std::min(least, curve.first_score()[entry]);
+        }
+        EXPECT_GT(seen, 10);
+        EXPECT_EQ(curve.least, least);
+      }
+    });
 }
 
 TEST_P(SequenceKernels, MinimaAreThoseOfTheScoresAndNearerThanThem) {
-  const std::vector<std::int32_t> all_squares = squares();
-  const SequenceArrays to = arrays(all_squares.data());
-  constexpr int count = 45, before = 16;
-  std::vector<std::int32_t> pixels, scores(before + 64 + 16, std::numeric_limits<std::int32_t>::max());
-  for (int k = 0; k < count; ++k) {
-    pixels.push_back(5 * width / 2 + k / 2 * 3);  // some twice
-    const std::int16_t* there = to.sequence(pixels.back());
-    scores[static_cast<std::size_t>(before + k)] =
-        all_squares[2] + all_squares[static_cast<std::size_t>(pixels.back())] - 2 * product(to.sequence(2), there);
-  }
-  const std::int32_t* first = scores.data() + before;
+  constexpr int count = 35, row = 3;
+  ScoredCurve curve;
+  curve.count = count;
+  curve.runs = {{0, 20, arrays().index(row, 0)}, {20, count, arrays().index(row + 1, 20)}};
+  curve.scores.assign(score_padding + 64 + score_padding, std::numeric_limits<std::int32_t>::max());
+  const Eigen::VectorXd g = sequence(2, 9);
+  for (int k = 0; k < count; ++k)
+    curve.scores[static_cast<std::size_t>(score_padding + k)] =
+        static_cast<std::int32_t>((g - sequence(curve.pixel_at(k))).squaredNorm());
+  const std::int32_t* first = curve.first_score();
   std::vector<std::int32_t> sorted(first, first + count);
   std::ranges::sort(sorted);
   const std::int32_t limit = sorted[count * 3 / 4];
-  std::vector<int> expected;
+  std::vector<float> expected;
   for (int k = 0; k < count; ++k)
-    if (first[k] <= limit && first[k] < first[k - 1] && first[k] <= first[k + 1]) expected.push_back(k);
+    if (first[k] <= limit && first[k] < first[k - 1] && first[k] <= first[k + 1])
+      expected.push_back(static_cast<float>(k));
   ASSERT_GT(expected.size(), 4U);
   on_every_target([&] {
-    std::array<CurveMinimum, 64> minima{};
-    const ScoredCurve curve{&to, pixels.data(), first, count, all_squares[2], false};
-    ASSERT_EQ(find_minima(curve, limit, minima.data()), static_cast<int>(expected.size()));
-    for (std::size_t i = 0; i < expected.size(); ++i) {
-      EXPECT_EQ(minima[i].place, static_cast<float>(expected[i]));
-      EXPECT_EQ(minima[i].distance_squared, static_cast<float>(first[expected[i]]));
-    }
-    improve_minima(curve, std::span(minima).first(expected.size()));
+    std::array<CurveMinimum, 64> room{};
+    const auto minima = std::span(room).first(static_cast<std::size_t>(find_minima(curve, limit, room.data())));
+    EXPECT_EQ(minima[0].distance_squared, static_cast<float>(sorted[0]));
+    for (const CurveMinimum& m : minima)
+      EXPECT_EQ(m.distance_squared, static_cast<float>(first[static_cast<int>(m.place)]));
+    std::ranges::sort(minima, {}, &CurveMinimum::place);
+    ASSERT_TRUE(std::ranges::equal(minima, expected, {}, &CurveMinimum::place));
+    improve_minima(arrays(), curve, static_cast<std::int32_t>(g.squaredNorm()), false, minima);
     for (std::size_t i = 0; i < expected.size(); ++i) {
       const auto [place, distance_squared] = minima[i];
-      EXPECT_LE(std::abs(place - static_cast<float>(expected[i])), 1);
+      EXPECT_LE(std::abs(place - expected[i]), 1);
       const int low = std::min(static_cast<int>(place), count - 2);
-      double distance = 0;
-      for (int k = 0; k < length; ++k) {
-        const double a = to.sequence(pixels[static_cast<std::size_t>(low)])[k];
-        const double b = to.sequence(pixels[static_cast<std::size_t>(low + 1)])[k];
-        distance += std::pow(to.sequence(2)[k] - a - (place - low) * (b - a), 2);
-      }
-      EXPECT_NEAR(distance_squared, distance, 1e-4 * all_squares[2]);
-      EXPECT_LE(distance_squared, 1.00001 * first[expected[i]]);
+      const Eigen::VectorXd a = sequence(curve.pixel_at(low)), b = sequence(curve.pixel_at(low + 1));
+      EXPECT_NEAR(distance_squared, (g - a - (place - static_cast<float>(low)) * (b - a)).squaredNorm(),
+                  1e-4 * g.squaredNorm());
+      EXPECT_LE(distance_squared, 1.00001 * first[static_cast<int>(expected[i])]);
     }
   });
+}
+
+TEST_P(SequenceKernels, NeighboursAreMultiplied) {
+  on_every_target([&] {
+    std::vector<std::int32_t> with_own(stride), with_next(stride);
+    multiply_neighbours(arrays(), 4, with_own.data(), with_next.data());
+    for (int x = 0; x + 1 < width; ++x) {
+      EXPECT_EQ(with_own[static_cast<std::size_t>(x)], sequence(x, 4).squaredNorm());
+      EXPECT_EQ(with_next[static_cast<std::size_t>(x)], sequence(x, 4).dot(sequence(x + 1, 4)));
+    }
+  });
+}
+
+/// Between two lines each, side by side or not.
+Crossings some_crossings(const SequenceArrays& to, bool are_neighbours, const std::int32_t* shares) {
+  Crossings crossings{{}, {}, are_neighbours, shares};
+  for (int k = 0; k < Crossings::count; ++k) {
+    const int line = are_neighbours ? 6 : 6 + k / 2;
+    crossings.low[static_cast<std::size_t>(k)] = to.sequence(line, 11 + k);
+    crossings.high[static_cast<std::size_t>(k)] = to.sequence(line + 1, 11 + k);
+  }
+  return crossings;
+}
+
+constexpr std::array<std::int32_t, Crossings::count> shares = {0, 10000, 20000, 30000};
+std::array<std::int32_t, Crossings::count> in_both_halves() {
+  std::array<std::int32_t, Crossings::count> both{};
+  for (std::size_t k = 0; k < both.size(); ++k) both[k] = shares[k] * 0x10001;
+  return both;
 }
 
 TEST_P(SequenceKernels, ProductsAreThoseOfTheInterpolatedSequences) {
-  const SequenceArrays to = arrays();
-  std::array<Crossing, 4> crossings;
-  Eigen::MatrixXd s(length, 5);
-  for (int i = 0; i < length; ++i) s(i, 0) = to.sequence(9)[i];
-  for (int k = 0; k < 4; ++k) {
-    const auto share = static_cast<std::int16_t>(k * 10000);
-    crossings[static_cast<std::size_t>(k)] = {to.sequence(40 + k), to.sequence(77 + k), share};
-    for (int i = 0; i < length; ++i)
-      s(i, k + 1) = to.sequence(40 + k)[i] + share / 32768.0 * (to.sequence(77 + k)[i] - to.sequence(40 + k)[i]);
-  }
-  const Eigen::MatrixXd expected = s.transpose() * s;
+  const auto both = in_both_halves();
+  const std::vector<std::int32_t> g = copy(9, 2);
   const double rounding = 2000 * std::sqrt(static_cast<double>(frames)) * 4;  // of the interpolated samples
-  on_every_target([&] {
-    const CrossingProducts products = multiply(crossings.data(), to.sequence(9), length);
-    EXPECT_EQ(products.gg, expected(0, 0));
-    for (int i = 0; i < 4; ++i) {
-      EXPECT_NEAR(products.gs[i], expected(0, i + 1), rounding);
-      for (int j = i; j < 4; ++j) EXPECT_NEAR(products.ss[i][j], expected(i + 1, j + 1), rounding);
+  for (const bool are_neighbours : {true, false}) {
+    Eigen::MatrixXd s(frames, 4);
+    for (int k = 0; k < 4; ++k) {
+      const int line = are_neighbours ? 6 : 6 + k / 2;
+      const double share = shares[static_cast<std::size_t>(k)] / 32768.0;
+      s.col(k) = (1 - share) * sequence(11 + k, line) + share * sequence(11 + k, line + 1);
     }
-  });
+    const Eigen::MatrixXd expected = s.transpose() * s;
+    const Eigen::VectorXd with_g = s.transpose() * sequence(9, 2);
+    on_every_target([&] {
+      const Crossings crossings = some_crossings(arrays(), are_neighbours, both.data());
+      const CrossingProducts products = multiply(arrays(), crossings, g.data());
+      for (int i = 0; i < 4; ++i) {
+        EXPECT_NEAR(products.gs[i], with_g[i], rounding);
+        for (int j = i; j < 4; ++j) EXPECT_NEAR(products.ss[i][j], expected(i, j), rounding);
+      }
+    });
+  }
 }
 
 TEST_P(SequenceKernels, ResidualsAreSummedOverTheFrames) {
-  const SequenceArrays to = arrays();
-  std::array<Crossing, 4> crossings;
-  for (int k = 0; k < 4; ++k)
-    crossings[static_cast<std::size_t>(k)] = {to.sequence(40 + k), to.sequence(77 + k), 16384};
-  const Mixture mixture{crossings.data(), {-0.1f, 0.6f, 0.55f, -0.05f}, {-0.3f, -0.5f, 0.7f, 0.1f}, 0.2f};
-  double rr = 0, dd = 0, rrdd = 0;
-  for (int i = 0; i < length; ++i) {
-    double r = to.sequence(9)[i], d = mixture.change_of_own * r;
-    for (int k = 0; k < 4; ++k) {
-      const double s = 0.5 * (to.sequence(40 + k)[i] + to.sequence(77 + k)[i]);
-      r -= mixture.value[k] * s;
-      d += mixture.change[k] * s;
-    }
-    rr += r * r;
-    dd += d * d;
-    rrdd += r * r * d * d;
+  const auto both = in_both_halves();
+  const std::vector<std::int32_t> g = copy(9, 2);
+  constexpr std::array<float, 4> value = {-0.1f, 0.6f, 0.55f, -0.05f}, change = {-0.3f, -0.5f, 0.7f, 0.1f};
+  constexpr float change_of_own = 0.2f;
+  Eigen::VectorXd r = sequence(9, 2), d = change_of_own * r;
+  for (int k = 0; k < 4; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const double share = shares[i] / 32768.0;
+    const Eigen::VectorXd s = (1 - share) * sequence(11 + k, 6) + share * sequence(11 + k, 7);
+    r -= value[i] * s;
+    d += change[i] * s;
   }
+  const double expected = (r.array() * d.array()).matrix().squaredNorm();
   on_every_target([&] {
-    const ResidualSums sums = sum_residuals(mixture, to.sequence(9), length);
-    EXPECT_NEAR(sums.rr, rr, 2e-3 * rr);  // interpolated samples are whole numbers
-    EXPECT_NEAR(sums.dd, dd, 2e-3 * dd);
-    EXPECT_NEAR(sums.rrdd, rrdd, 4e-3 * rrdd);
+    for (const std::size_t pixel : {0U, 7U, 15U}) {
+      MixtureBatch batch;
+      batch.own.resize(static_cast<std::size_t>(pairs) * MixtureBatch::most);
+      batch.crossings.resize(batch.own.size() * Crossings::count);
+      for (std::size_t k = 0; k < 4; ++k) {
+        batch.value[k][pixel] = value[k];
+        batch.change[k][pixel] = change[k];
+      }
+      batch.change_of_own[pixel] = change_of_own;
+      enter(arrays(), some_crossings(arrays(), true, both.data()), g.data(), pixel, batch);
+      sum_weighted_residuals(pairs, batch);
+      EXPECT_NEAR(batch.rrdd[pixel], expected, 4e-3 * expected);  // interpolated samples are whole numbers
+    }
   });
 }
 
@@ -200,30 +289,33 @@ TEST_P(SequenceKernels, PackedSequencesAreNormalised) {
     pointers.push_back(row.data());
   }
   for (const bool affine : {false, true})
-    on_every_target([&] {
-      alignas(64) std::array<float, room> energy, lowest, highest, scale;
-      std::vector<std::int16_t> out(static_cast<std::size_t>(pixels * length), 77);
-      pack_sequences({pointers, pixels, range}, affine, length, out.data(),
-                     {energy.data(), lowest.data(), highest.data(), scale.data()});
-      for (std::size_t p = 0; p < pixels; ++p) {
-        Eigen::VectorXf g(frames);
-        for (int i = 0; i < frames; ++i) g[i] = std::min(range, rows[static_cast<std::size_t>(i)][p]);
-        EXPECT_EQ(lowest[p], g.minCoeff());
-        EXPECT_EQ(highest[p], g.maxCoeff());
-        const float mean = g.mean(), expected_energy = (g.array() - mean).matrix().squaredNorm();
-        EXPECT_NEAR(energy[p], expected_energy, 1e-4f * range * range);
-        const float size =
-            affine ? std::sqrt(std::max(expected_energy, 1e-6f)) : range * std::sqrt(static_cast<float>(frames));
-        if (p != 3) {
-          EXPECT_NEAR(scale[p], sequence_scale / size, 1e-4f * scale[p]);
+    for (const bool side_by_side : {false, true})
+      on_every_target([&] {
+        alignas(64) std::array<float, room> energy, lowest, highest, scale;
+        std::vector<std::int32_t> out(static_cast<std::size_t>(room * pairs), 77);
+        const std::ptrdiff_t pair_step = side_by_side ? room : 1, pixel_step = side_by_side ? 1 : pairs;
+        pack_sequences({pointers, pixels, range}, affine, {out.data(), pair_step, pixel_step},
+                       {energy.data(), lowest.data(), highest.data(), scale.data()});
+        for (std::size_t p = 0; p < pixels; ++p) {
+          Eigen::VectorXf g(frames);
+          for (int i = 0; i < frames; ++i) g[i] = std::min(range, rows[static_cast<std::size_t>(i)][p]);
+          EXPECT_EQ(lowest[p], g.minCoeff());
+          EXPECT_EQ(highest[p], g.maxCoeff());
+          const float mean = g.mean(), expected_energy = (g.array() - mean).matrix().squaredNorm();
+          EXPECT_NEAR(energy[p], expected_energy, 1e-4f * range * range);
+          const float size =
+              affine ? std::sqrt(std::max(expected_energy, 1e-6f)) : range * std::sqrt(static_cast<float>(frames));
+          if (p != 3) {
+            EXPECT_NEAR(scale[p], sequence_scale / size, 1e-4f * scale[p]);
+          }
+          for (int i = 0; i < 2 * pairs; ++i) {
+            const std::int32_t pair =
+                out[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(p) * pixel_step + i / 2 * pair_step)];
+            const float stored = i < frames ? scale[p] * (g[i] - (affine ? mean : 0)) : 0;
+            EXPECT_NEAR(static_cast<std::int16_t>(i % 2 == 0 ? pair : pair >> 16), stored, 0.51) << p << ' ' << i;
+          }
         }
-        for (int i = 0; i < length; ++i) {
-          const float stored = i < frames ? scale[p] * (g[i] - (affine ? mean : 0)) : 0;
-          EXPECT_NEAR(out[p * static_cast<std::size_t>(length) + static_cast<std::size_t>(i)], stored, 0.51)
-              << p << ' ' << i;
-        }
-      }
-    });
+      });
 }
 
 INSTANTIATE_TEST_SUITE_P(Frames, SequenceKernels, testing::Values(13, 32, 40),

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
+#include "pagesweep/base/image.h"
 #include "pagesweep/base/parallel.h"
 
 namespace pagesweep {
@@ -40,32 +40,50 @@ class SampleReader {
   std::vector<const float*> rows_;
 };
 
+/// An odd number of cache lines, so that the rows of a line are not all kept at the same place.
+int stride_for(int places) {
+  constexpr int cache_line = 16;
+  const int lines = (places + score_padding + cache_line - 1) / cache_line;
+  return (lines | 1) * cache_line;
+}
+
 }  // namespace
 
-SequenceStore::SequenceStore(const Frames& frames, const std::vector<int>& instants, const MatchOptions& options)
-    : samples_(static_cast<int>(instants.size())),
-      parts_((instants.size() + sequence_padding - 1) / sequence_padding),
-      energy_(frames.width(), frames.height()),
-      rounding_variance_(frames.width(), frames.height()),
-      status_(frames.width(), frames.height(), PixelStatus::ok) {
-  data_ = std::make_unique_for_overwrite<SequencePart[]>((status_.size() + 1) * parts_);
-  std::fill_n(sequence_at(status_.size()), length(), std::int16_t{0});
-  if (options.normalisation == Normalisation::none) {
-    squares_.resize(status_.size() + 1);
-    squares_.back() = nothing;
-  }
-  parallel_ranges(height(), 16, [&](int begin, int end) { store_rows(frames, instants, options, begin, end); });
+SequenceStore::SequenceStore(const Frames& frames, const std::vector<int>& instants, bool along_rows,
+                             const MatchOptions& options)
+    : samples_(static_cast<int>(instants.size())) {
+  const int lines = along_rows ? frames.height() : frames.width();
+  const int places = along_rows ? frames.width() : frames.height();
+  const int pairs = (samples_ + 1) / 2, stride = stride_for(places);
+  const std::size_t pixels = static_cast<std::size_t>(lines) * static_cast<std::size_t>(stride);
+  pairs_ = std::make_unique_for_overwrite<PairBlock[]>(pixels / score_padding * static_cast<std::size_t>(pairs));
+  own_ = std::make_unique_for_overwrite<std::int32_t[]>(pixels);
+  next_ = std::make_unique_for_overwrite<std::int32_t[]>(pixels);
+  energy_ = std::make_unique_for_overwrite<float[]>(pixels);
+  rounding_variance_ = std::make_unique_for_overwrite<float[]>(pixels);
+  status_ = std::make_unique_for_overwrite<PixelStatus[]>(pixels);
+  if (options.normalisation == Normalisation::none) squares_.resize(pixels);
+  arrays_ = {pairs_[0].pairs, own_.get(), squares_.empty() ? nullptr : squares_.data(),
+             next_.get(),     pairs,      stride,
+             lines,           places,     along_rows};
+  parallel_ranges(frames.height(), 16, [&](int begin, int end) { store_rows(frames, instants, options, begin, end); });
+  parallel_ranges(lines, 16, [&](int begin, int end) {
+    for (int line = begin; line < end; ++line) {
+      const std::size_t first = at(arrays_.index(line, 0));
+      multiply_neighbours(arrays_, line, &own_[first], &next_[first]);
+    }
+  });
 }
 
 void SequenceStore::store_rows(const Frames& frames, const std::vector<int>& instants, const MatchOptions& options,
                                int begin, int end) {
   const auto range = static_cast<float>(frames.sequence().saturation - frames.sequence().black_level);
+  const int width = frames.width(), pixels = std::min(pixels_at_once, width);
   SampleReader reader(frames, instants);
   for (int y = begin; y < end; ++y)
-    for (int left = 0; left < width(); left += pixels_at_once) {
+    for (int left = 0; left < width; left += pixels_at_once) {
       // The last pixels of a row are stored together with some that already are.
-      const int first = std::max(0, std::min(left, width() - pixels_at_once));
-      const int pixels = std::min(pixels_at_once, width());
+      const int first = std::max(0, std::min(left, width - pixels_at_once));
       store(first, y, {reader.read(y, first), pixels, range}, options);
     }
 }
@@ -74,19 +92,33 @@ void SequenceStore::store(int left, int y, const GrayRows& gray, const MatchOpti
   alignas(64) std::array<float, pixels_at_once> energy, lowest, highest, scale;
   const bool affine = options.normalisation == Normalisation::affine;
   const auto darkest = static_cast<float>(options.min_modulation) * gray.range;
-  pack_sequences(gray, affine, length(), sequence_at(index(left, y)),
+  const int line = arrays_.along_rows ? y : left, place = arrays_.along_rows ? left : y;
+  const std::ptrdiff_t stride = arrays_.stride, pixel_step = arrays_.along_rows ? 1 : arrays_.pairs * stride;
+  pack_sequences(gray, affine, {sequence(line, place), stride, pixel_step},
                  {energy.data(), lowest.data(), highest.data(), scale.data()});
   for (std::size_t k = 0; k < static_cast<std::size_t>(gray.pixels); ++k) {
-    const std::size_t pixel = index(left, y) + k;
-    std::int16_t* sequence = sequence_at(pixel);
-    energy_.data()[pixel] = energy[k] * scale[k] * scale[k];
-    rounding_variance_.data()[pixel] = scale[k] * scale[k] / 12;
+    const std::int32_t pixel = index(left + static_cast<int>(k), y);
+    energy_[at(pixel)] = energy[k] * scale[k] * scale[k];
+    rounding_variance_[at(pixel)] = scale[k] * scale[k] / 12;
     const bool known = highest[k] - lowest[k] >= darkest;
-    if (!known) {
-      status_.data()[pixel] = lowest[k] >= gray.range ? PixelStatus::saturated : PixelStatus::too_dark;
-      std::fill_n(sequence, length(), std::int16_t{0});
-    }
-    if (!affine) squares_[pixel] = known ? std::inner_product(sequence, sequence + length(), sequence, 0) : nothing;
+    status_[at(pixel)] = known                     ? PixelStatus::ok
+                         : lowest[k] >= gray.range ? PixelStatus::saturated
+                                                   : PixelStatus::too_dark;
+    if (!known) store_zeros(pixel);
+    if (!affine) squares_[at(pixel)] = known ? multiply(arrays_, pixel, pixel) : nothing;
+  }
+}
+
+void SequenceStore::store_zeros(std::int32_t index) {
+  std::int32_t* pair = sequence(index / arrays_.stride, index % arrays_.stride);
+  for (int j = 0; j < arrays_.pairs; ++j, pair += arrays_.stride) *pair = 0;
+}
+
+void SequenceStore::copy(std::int32_t index, std::span<std::int32_t> pairs) const {
+  const std::int32_t* pair = arrays_.sequence(index);
+  for (std::int32_t& out : pairs) {
+    out = *pair;
+    pair += arrays_.stride;
   }
 }
 

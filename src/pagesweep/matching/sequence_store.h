@@ -3,10 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <memory>
+#include <span>
 #include <vector>
 
-#include "pagesweep/base/image.h"
 #include "pagesweep/data/frames.h"
 #include "pagesweep/data/status.h"
 #include "pagesweep/matching/match_epipolar.h"
@@ -21,51 +22,58 @@ namespace pagesweep {
 /// (1 - correlation). A clipped sample stands as the saturation value. Pixels without a sequence have zeros.
 class SequenceStore {
  public:
-  /// \param instants  the frames to use
-  SequenceStore(const Frames& frames, const std::vector<int>& instants, const MatchOptions& options);
+  /// \param instants    the frames to use
+  /// \param along_rows  whether epipolar curves run along this picture's rows rather than its columns
+  SequenceStore(const Frames& frames, const std::vector<int>& instants, bool along_rows, const MatchOptions& options);
 
-  int width() const { return status_.width(); }
-  int height() const { return status_.height(); }
-  int samples() const { return samples_; }  ///< a sequence, without filling
-  SequenceArrays arrays() const {
-    return {data_[0].samples, squares_.empty() ? nullptr : squares_.data(), length(), width(), height()};
-  }
-  const std::int16_t* sequence(int x, int y) const { return arrays().sequence(y * width() + x); }
+  int samples() const { return samples_; }
+  const SequenceArrays& arrays() const { return arrays_; }
+  /// Of a pixel, as all that follow take it.
+  std::int32_t index(int x, int y) const { return arrays_.along_rows ? arrays_.index(y, x) : arrays_.index(x, y); }
+  /// Copies a sequence's pairs of samples one behind the other.
+  void copy(std::int32_t index, std::span<std::int32_t> pairs) const;
   /// Scalar product of a sequence with itself.
-  std::int32_t square(int x, int y) const { return squares_.empty() ? full_square : squares_[index(x, y)]; }
+  std::int32_t square(std::int32_t index) const { return own_[at(index)]; }
   /// Sum of squared deviations from the sequence's mean, in the store's own units.
-  float energy(int x, int y) const { return energy_(x, y); }
+  float energy(std::int32_t index) const { return energy_[at(index)]; }
   /// Variance of one stored sample that comes from rounding the gray values, in the store's own units.
-  float rounding_variance(int x, int y) const { return rounding_variance_(x, y); }
-  float rounding_variance(std::int32_t pixel) const { return rounding_variance_.data()[pixel]; }
+  float rounding_variance(std::int32_t index) const { return rounding_variance_[at(index)]; }
   /// ok, too_dark, or saturated where every sample is clipped.
-  PixelStatus status(int x, int y) const { return status_(x, y); }
-  PixelStatus status(std::int32_t pixel) const { return status_.data()[pixel]; }
+  PixelStatus status(std::int32_t index) const { return status_[at(index)]; }
+  /// Whether this pixel and the three next places of its line have sequences.
+  bool are_known(std::int32_t index) const {
+    static_assert(PixelStatus::ok == PixelStatus{} && sizeof(PixelStatus) == 1);
+    std::uint32_t statuses;
+    std::memcpy(&statuses, &status_[at(index)], sizeof(statuses));
+    return statuses == 0;
+  }
 
  private:
   static constexpr std::int32_t full_square = sequence_scale * sequence_scale;
   static constexpr std::int32_t nothing = 4 * full_square;  ///< in place of a square: unlike everything
 
-  std::size_t index(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width()) + static_cast<std::size_t>(x);
-  }
-  std::int16_t* sequence_at(std::size_t pixel) { return data_[pixel * parts_].samples; }
-  int length() const { return static_cast<int>(parts_) * sequence_padding; }
+  /// A cache line.
+  struct alignas(4 * score_padding) PairBlock {
+    std::int32_t pairs[score_padding];
+  };
+
+  static std::size_t at(std::int32_t index) { return static_cast<std::size_t>(index); }
   void store_rows(const Frames& frames, const std::vector<int>& instants, const MatchOptions& options, int begin,
                   int end);
   void store(int left, int y, const GrayRows& gray, const MatchOptions& options);
-
-  /// A cache line. Allocated without being cleared: the threads that fill it touch it first.
-  struct alignas(2 * sequence_padding) SequencePart {
-    std::int16_t samples[sequence_padding];
-  };
+  void store_zeros(std::int32_t index);
+  std::int32_t* sequence(int line, int place) {
+    return pairs_[0].pairs + (arrays_.sequence(line, place) - arrays_.data);
+  }
 
   int samples_;
-  std::size_t parts_;                     ///< of a sequence
-  std::unique_ptr<SequencePart[]> data_;  ///< sequence by sequence, and one of zeros
-  std::vector<std::int32_t> squares_;     ///< empty where all are alike
-  Image<float> energy_, rounding_variance_;
-  Image<PixelStatus> status_;
+  SequenceArrays arrays_;
+  /// Allocated without being cleared: the threads that fill it touch it first.
+  std::unique_ptr<PairBlock[]> pairs_;
+  std::unique_ptr<std::int32_t[]> own_, next_;
+  std::unique_ptr<float[]> energy_, rounding_variance_;
+  std::unique_ptr<PixelStatus[]> status_;
+  std::vector<std::int32_t> squares_;  ///< empty where all are alike
 };
 
 }  // namespace pagesweep
