@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/dewarping/gain_kernels.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -48,13 +49,12 @@ void SpreadGains(std::span<const std::vector<float>> nodes, float nodes_per_px, 
                     : SpreadRow<1>(nodes, nodes_per_px, shown, gains.data());
 }
 
-template <class T>
-void MultiplyLight(const ToneTables& tones, std::span<const float> gains, std::span<T> samples) {
+void MultiplyLight(const ToneTables& tones, std::span<const float> gains, std::span<std::uint16_t> samples) {
   const Tag d;
   const hn::RebindToSigned<Tag> di;
-  const hn::Rebind<T, Tag> dt;
-  const Vec cells = hn::Set(d, static_cast<float>(tones.cells));
-  const auto last = hn::Set(di, tones.cells - 1);
+  const hn::Rebind<std::uint16_t, Tag> dt;
+  const Vec cells = hn::Set(d, ToneTables::cells);
+  const auto last = hn::Set(di, ToneTables::cells - 1);
   for (std::size_t k = 0; k < samples.size(); k += hn::Lanes(d)) {
     const auto before = hn::PromoteTo(di, hn::LoadU(dt, &samples[k]));
     const Vec gain = hn::LoadU(d, &gains[k]);
@@ -71,13 +71,6 @@ void MultiplyLight(const ToneTables& tones, std::span<const float> gains, std::s
   }
 }
 
-void MultiplyLight8(const ToneTables& tones, std::span<const float> gains, std::span<std::uint8_t> samples) {
-  MultiplyLight(tones, gains, samples);
-}
-void MultiplyLight16(const ToneTables& tones, std::span<const float> gains, std::span<std::uint16_t> samples) {
-  MultiplyLight(tones, gains, samples);
-}
-
 }  // namespace
 }  // namespace pagesweep::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -86,11 +79,9 @@ HWY_AFTER_NAMESPACE();
 namespace pagesweep {
 
 HWY_EXPORT(SpreadGains);
-HWY_EXPORT(MultiplyLight8);
-HWY_EXPORT(MultiplyLight16);
+HWY_EXPORT(MultiplyLight);
 
-ToneTables::ToneTables(const TransferCurve& curve, int bit_depth)
-    : cells(bit_depth > 8 ? 1 << 14 : 1 << 11), light(curve.table(bit_depth)) {
+ToneTables::ToneTables(const TransferCurve& curve, int bit_depth) : light(curve.table(bit_depth)) {
   const int white = (1 << bit_depth) - 1;
   for (int k = 0; k <= cells; ++k)
     samples.push_back(static_cast<float>(curve.sample(std::pow(double(k) / cells, 2)) * white));
@@ -101,12 +92,33 @@ void spread_gains(std::span<const std::vector<float>> nodes, float nodes_per_px,
   HWY_DYNAMIC_DISPATCH(SpreadGains)(nodes, nodes_per_px, shown, gains);
 }
 
-void multiply_light(const ToneTables& tones, std::span<const float> gains, std::span<std::uint8_t> samples) {
-  HWY_DYNAMIC_DISPATCH(MultiplyLight8)(tones, gains, samples);
+void multiply_light(const ToneTables& tones, std::span<const float> gains, std::span<std::uint16_t> samples) {
+  HWY_DYNAMIC_DISPATCH(MultiplyLight)(tones, gains, samples);
 }
 
-void multiply_light(const ToneTables& tones, std::span<const float> gains, std::span<std::uint16_t> samples) {
-  HWY_DYNAMIC_DISPATCH(MultiplyLight16)(tones, gains, samples);
+ByteTones::ByteTones(const ToneTables& tones, float least_gain, float most_gain)
+    : first_(least_gain), steps_per_gain_(4096 / least_gain) {
+  const int steps = static_cast<int>((most_gain - least_gain) * steps_per_gain_ + 0.5f) + 1;
+  shown_ = Image<std::uint8_t>(1 + steps, 256);
+  for (int s = 0; s < 256; ++s) {
+    shown_(0, s) = static_cast<std::uint8_t>(s);
+    for (int step = 0; step < steps; ++step) {
+      const float gain = first_ + static_cast<float>(step) / steps_per_gain_;
+      const float light = std::min(tones.light[static_cast<std::size_t>(s)] * gain, 1.0f);
+      const auto cell = static_cast<std::size_t>(std::sqrt(light) * ToneTables::cells + 0.5f);
+      shown_(1 + step, s) = static_cast<std::uint8_t>(tones.samples[cell] + 0.5f);
+    }
+  }
+}
+
+void ByteTones::multiply_light(std::span<const float> gains, std::span<std::uint8_t> samples) const {
+  const float steps_per_gain = steps_per_gain_, offset = 1.5f - first_ * steps_per_gain_;
+  const int columns = shown_.width(), last = columns - 1;
+  const std::uint8_t* shown = shown_.data();
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const int step = std::clamp(static_cast<int>(gains[k] * steps_per_gain + offset), 0, last);
+    samples[k] = shown[samples[k] * columns + step];
+  }
 }
 
 }  // namespace pagesweep

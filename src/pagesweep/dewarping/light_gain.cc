@@ -13,12 +13,20 @@ namespace {
 
 constexpr int rows_at_once = 32;
 
+/// What multiplies 16 bit samples' light, as ByteTones does that of 8 bit.
+struct WordTones {
+  ToneTables tones;
+  void multiply_light(std::span<const float> gains, std::span<std::uint16_t> samples) const {
+    pagesweep::multiply_light(tones, gains, samples);
+  }
+};
+
 /// The rows of one thread, and what it needs room for.
-template <class T>
+template <class T, class Tones>
 class RowGainer {
  public:
-  RowGainer(const LightGain& gain, const ToneTables& tones, const Image<float>& shown, int channels,
-            double pixels_per_mm, Image<T>& samples)
+  RowGainer(const LightGain& gain, const Tones& tones, const Image<float>& shown, int channels, double pixels_per_mm,
+            Image<T>& samples)
       : gain_(gain),
         tones_(tones),
         shown_(shown),
@@ -37,7 +45,7 @@ class RowGainer {
     std::ranges::copy(shown_.row(y), shown_row_.begin());
     spread_gains(nodes_, nodes_per_px_, shown_row_, gains_);
     std::ranges::copy(samples_.row(y), row_.begin());
-    multiply_light(tones_, gains_, std::span(row_));
+    tones_.multiply_light(gains_, row_);
     std::copy_n(row_.begin(), samples_.width(), samples_.row(y).begin());
   }
 
@@ -55,7 +63,7 @@ class RowGainer {
   }
 
   const LightGain& gain_;
-  const ToneTables& tones_;
+  const Tones& tones_;
   const Image<float>& shown_;
   Image<T>& samples_;
   float nodes_per_px_;
@@ -64,19 +72,30 @@ class RowGainer {
   std::vector<T> row_;
 };
 
+template <class T, class Tones>
+void apply_to_rows(const LightGain& gain, const Tones& tones, Page& page, Image<T>& samples) {
+  const Picture& picture = page.picture;
+  parallel_ranges(picture.height(), rows_at_once, [&](int begin, int end) {
+    RowGainer<T, Tones> gainer(gain, tones, page.scan_map.u, picture.channels, picture.pixels_per_mm, samples);
+    for (int y = begin; y < end; ++y) gainer.apply(y);
+  });
+}
+
 }  // namespace
 
 void apply_gain(const LightGain& gain, Page& page) {
   Picture& picture = page.picture;
-  const ToneTables tones(TransferCurve::of(picture), picture.bit_depth());
-  std::visit(
-      [&]<class T>(Image<T>& samples) {
-        parallel_ranges(picture.height(), rows_at_once, [&](int begin, int end) {
-          RowGainer<T> gainer(gain, tones, page.scan_map.u, picture.channels, picture.pixels_per_mm, samples);
-          for (int y = begin; y < end; ++y) gainer.apply(y);
-        });
-      },
-      picture.samples);
+  ToneTables tones(TransferCurve::of(picture), picture.bit_depth());
+  if (auto* words = std::get_if<Image<std::uint16_t>>(&picture.samples)) {
+    apply_to_rows(gain, WordTones{std::move(tones)}, page, *words);
+    return;
+  }
+  float least = 1, most = 1;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(picture.channels); ++c) {
+    least = std::min(least, std::ranges::min(gain.values[c].pixels()));
+    most = std::max(most, std::ranges::max(gain.values[c].pixels()));
+  }
+  apply_to_rows(gain, ByteTones(tones, least, most), page, std::get<Image<std::uint8_t>>(picture.samples));
 }
 
 }  // namespace pagesweep
