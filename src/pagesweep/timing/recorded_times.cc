@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "pagesweep/base/parallel.h"
-#include "pagesweep/timing/tile_times_internal.h"
 #include "pagesweep/timing/width_meter_internal.h"
 
 namespace pagesweep {
@@ -97,12 +96,23 @@ void RecordedTimes::estimate(const std::vector<Tile*>& tiles) {
     for (int i = begin; i < end; ++i) {
       Tile& tile = *tiles[static_cast<std::size_t>(i)];
       const WidthTile place = width_tile(windows.sequence().width, windows.sequence().height, tile.column, tile.row);
-      for (int y = place.top; y < place.top + place.height; ++y) times.estimate(y, place.left, place.width);
+      const bool is_all_new = tile.estimated_from < 0 || tile.widths != widths_around(tile);
+      for (int y = place.top; y < place.top + place.height; ++y) estimate_row(times, place, y, is_all_new);
       tile.estimated_from = recorded(tile);
       tile.estimated_clear = clear(tile);
       tile.widths = widths_around(tile);
     }
   });
+}
+
+void RecordedTimes::estimate_row(TileTimes& times, const WidthTile& place, int y, bool is_all_new) {
+  constexpr int group_px = StripeRecorder::group_px;
+  // Pixels of a group are fitted together: what one group shows is not touched by what others do.
+  for (int left = place.left; left < place.left + place.width; left += group_px) {
+    std::uint8_t& is_new = recorder_.news()(left / group_px, y);
+    if (is_all_new || is_new != 0) times.estimate(y, left, std::min(group_px, place.left + place.width - left));
+    is_new = 0;
+  }
 }
 
 double RecordedTimes::known_until() const {

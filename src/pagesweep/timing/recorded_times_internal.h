@@ -9,6 +9,7 @@
 #include "pagesweep/timing/estimate_times.h"
 #include "pagesweep/timing/pixel_time_internal.h"
 #include "pagesweep/timing/stripe_recorder_internal.h"
+#include "pagesweep/timing/tile_times_internal.h"
 
 namespace pagesweep {
 
@@ -63,6 +64,8 @@ class RecordedTimes {
   std::array<float, 9> widths_around(const Tile& tile) const;
   void measure_widths(const std::vector<Tile*>& tiles);
   void estimate(const std::vector<Tile*>& tiles);
+  /// A row of a tile; unless it is all new, only the groups that have got a window.
+  void estimate_row(TileTimes& times, const WidthTile& place, int y, bool is_all_new);
 
   const StripeProfile& profile_;
   FrameNoise noise_;

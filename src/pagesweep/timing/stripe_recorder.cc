@@ -9,7 +9,6 @@
 #include <span>
 
 #include "pagesweep/base/parallel.h"
-#include "pagesweep/timing/row_kernels_internal.h"
 
 namespace pagesweep {
 namespace {
@@ -65,6 +64,7 @@ StripeRecorder::StripeRecorder(const Sequence& sequence, double fwhm, int half, 
       windows_(sequence, half),
       recorded_place_(sequence.width, sequence.height, -1),
       tiles_(width_tiles(sequence.width), width_tiles(sequence.height)),
+      news_((sequence.width + group_px - 1) / group_px, sequence.height),
       clipped_(sequence.width, sequence.height) {}
 
 int StripeRecorder::last_ready(int end) const {
@@ -161,6 +161,7 @@ void StripeRecorder::record(const Step& step, const RawRow& rows, int y, int lef
   }
   if (scratch.ready.empty()) return;
   tile.windows += static_cast<int>(scratch.ready.size());
+  news_(left / group_px, y) = 1;
   std::visit([&](const auto& present) { cut(step, present, y, left, scratch); }, rows);
 }
 

@@ -6,6 +6,7 @@
 
 #include "pagesweep/base/image.h"
 #include "pagesweep/timing/coarse_search_internal.h"
+#include "pagesweep/timing/row_kernels_internal.h"
 #include "pagesweep/timing/stripe_windows_internal.h"
 #include "pagesweep/timing/width_tiles_internal.h"
 
@@ -42,6 +43,10 @@ class StripeRecorder {
     int waiting = 0;  ///< pixels whose bell is clear and not over yet
   };
   const Image<Tile>& tiles() const { return tiles_; }
+  /// Of each `group_px` pixels side by side, entry (x / group_px, y), whether one got a window since the entry was
+  /// last cleared.
+  static constexpr int group_px = tile_pixels;
+  Image<std::uint8_t>& news() { return news_; }
   /// [frames] Clear bells whose middle lies before have windows.
   double recorded_until() const { return (ready_done_ + 1) * search_.block() - 0.5; }
   /// [frames] Middle of the earliest clear bell of a tile; infinity if there is none.
@@ -69,6 +74,7 @@ class StripeRecorder {
   StripeWindows windows_;
   Image<std::int32_t> recorded_place_;  ///< of each pixel's window
   Image<Tile> tiles_;
+  Image<std::uint8_t> news_;
   Image<std::uint8_t> clipped_;
   int places_done_ = 0;
   int ready_done_ = -1;  ///< place
