@@ -27,7 +27,6 @@ CoarseSearch::CoarseSearch(int width, int height, double fwhm, double read_varia
       rise_(width, height, -std::numeric_limits<float>::infinity()),
       before_(width, height, not_a_number),
       after_(width, height, not_a_number),
-      last_(width, height, not_a_number),
       best_(width, height, -1) {}
 
 CoarseSearch::Step CoarseSearch::next_step(int done, int frame_count, bool ended) const {
@@ -37,30 +36,31 @@ CoarseSearch::Step CoarseSearch::next_step(int done, int frame_count, bool ended
   step.end_block = ended ? (frame_count + block_ - 1) / block_ : frame_count / block_;
   step.first_place = done;
   step.end_place = std::max(done, ended ? step.end_block - 1 : step.end_block - blocks_after);
-  step.first_block = std::max(0, done - blocks_before);
+  step.first_block = std::max(0, done - 1 - blocks_before);  // the response before the first place takes part
   return step;
 }
 
 template <class T>
-void CoarseSearch::sum_blocks(const Step& step, const RowsOf<T>& rows, int first_frame, Image<float>& sums) const {
+void CoarseSearch::sum_blocks(const Step& step, const RowsOf<T>& rows, int first_frame, int left, int columns,
+                              Image<float>& sums) const {
   for (int k = step.first_block; k < step.end_block; ++k) {
     const int begin = k * block_, count = std::min(block_, step.frame_count - begin);
     const auto frames =
         std::span(rows).subspan(static_cast<std::size_t>(begin - first_frame), static_cast<std::size_t>(count));
     // A block that the recording's end has cut counts as a whole one.
-    sum_rows(frames, 0, static_cast<float>(block_) / static_cast<float>(count), sums.row(k - step.first_block));
+    sum_rows(frames, left, static_cast<float>(block_) / static_cast<float>(count),
+             sums.row(k - step.first_block).first(static_cast<std::size_t>(columns)));
   }
 }
 
-void CoarseSearch::look(const Step& step, const RawRow& rows, int first_frame, int y, Image<float>& sums) {
+void CoarseSearch::look(const Step& step, const RawRow& rows, int first_frame, int y, int left, int columns,
+                        Image<float>& sums) {
   if (step.first_place == step.end_place) return;
-  const int blocks = step.end_block - step.first_block, columns = rise_.width();
-  if (sums.width() != columns || sums.height() < blocks) sums = Image<float>(columns, blocks);
-  std::visit([&](const auto& present) { sum_blocks(step, present, first_frame, sums); }, rows);
-  const HighestRow highest{rise_.row(y).data(), before_.row(y).data(), after_.row(y).data(), last_.row(y).data(),
-                           best_.row(y).data()};
+  const int blocks = step.end_block - step.first_block;
+  if (sums.width() < columns || sums.height() < blocks) sums = Image<float>(rise_.width(), blocks);
+  std::visit([&](const auto& present) { sum_blocks(step, present, first_frame, left, columns, sums); }, rows);
   std::vector<Place> places;
-  for (int k = step.first_place; k < step.end_place; ++k) {
+  for (int k = std::max(0, step.first_place - 1); k < step.end_place; ++k) {
     const bool has_left = k >= blocks_before, has_right = k + blocks_after < step.end_block;
     if (!has_left && !has_right) continue;
     // Where one side is missing, the other stands for both.
@@ -70,7 +70,12 @@ void CoarseSearch::look(const Step& step, const RawRow& rows, int first_frame, i
                       {block(left_side), block(left_side + 1), block(right_side), block(right_side + 1)},
                       k});
   }
-  keep_highest(places, highest, static_cast<std::size_t>(columns));
+  if (places.empty()) return;
+  const bool has_previous = places.front().number < step.first_place;
+  const auto at = static_cast<std::size_t>(left);
+  keep_highest(has_previous ? &places.front() : nullptr, std::span(places).subspan(has_previous ? 1 : 0),
+               {&rise_.row(y)[at], &before_.row(y)[at], &after_.row(y)[at], &best_.row(y)[at]},
+               static_cast<std::size_t>(columns));
 }
 
 int CoarseSearch::frame(int x, int y, int frame_count) const {

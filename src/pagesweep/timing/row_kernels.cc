@@ -76,38 +76,62 @@ void CountClipped(Rows<T> all_rows, T saturation, std::span<std::uint8_t> counts
 }
 
 template <class D>
-void keep_highest_of(D d, std::span<const Place> places, const HighestRow& row, std::size_t x) {
+hn::Vec<D> response_at(D d, const Place& place, std::size_t x) {
+  const auto at = [d, x](const float* sums) { return hn::LoadU(d, sums + x); };
+  const auto& [middle, side, number] = place;
+  const auto sides = hn::Add(hn::Add(at(side[0]), at(side[1])), hn::Add(at(side[2]), at(side[3])));
+  const auto light = hn::Add(at(middle[0]), at(middle[1]));
+  return hn::Sub(hn::Add(light, light), sides);
+}
+
+template <class D>
+void keep_highest_of(D d, const Place* previous, std::span<const Place> places, const HighestRow& row, std::size_t x) {
   const hn::RebindToSigned<D> integers;
+  const auto none = hn::Set(d, std::numeric_limits<float>::quiet_NaN());
   auto rise = hn::LoadU(d, row.rise + x), before = hn::LoadU(d, row.before + x), after = hn::LoadU(d, row.after + x);
-  auto last = hn::LoadU(d, row.last + x);
+  auto last = previous ? response_at(d, *previous, x) : none;
   auto best = hn::LoadU(integers, row.best + x);
   for (const Place& place : places) {
-    const auto at = [d, x](const float* sums) { return hn::LoadU(d, sums + x); };
-    const auto& [middle, side, number] = place;
-    const auto sides = hn::Add(hn::Add(at(side[0]), at(side[1])), hn::Add(at(side[2]), at(side[3])));
-    const auto light = hn::Add(at(middle[0]), at(middle[1])), response = hn::Sub(hn::Add(light, light), sides);
+    const auto response = response_at(d, place, x);
     const auto higher = hn::Gt(response, rise);
-    const auto follows = hn::RebindMask(d, hn::Eq(best, hn::Set(integers, number - 1)));
+    const auto follows = hn::RebindMask(d, hn::Eq(best, hn::Set(integers, place.number - 1)));
     after = hn::IfThenElse(follows, response, after);
-    after = hn::IfThenElse(higher, hn::Set(d, std::numeric_limits<float>::quiet_NaN()), after);
+    after = hn::IfThenElse(higher, none, after);
     before = hn::IfThenElse(higher, last, before);
     rise = hn::IfThenElse(higher, response, rise);
-    best = hn::IfThenElse(hn::RebindMask(integers, higher), hn::Set(integers, number), best);
+    best = hn::IfThenElse(hn::RebindMask(integers, higher), hn::Set(integers, place.number), best);
     last = response;
   }
   hn::StoreU(rise, d, row.rise + x);
   hn::StoreU(before, d, row.before + x);
   hn::StoreU(after, d, row.after + x);
-  hn::StoreU(last, d, row.last + x);
   hn::StoreU(best, integers, row.best + x);
 }
 
-void KeepHighest(std::span<const Place> places, const HighestRow& row, std::size_t count) {
+void KeepHighest(const Place* previous, std::span<const Place> places, const HighestRow& row, std::size_t count) {
   const Floats d;
   const hn::CappedTag<float, 1> single;
   std::size_t x = 0;
-  for (; x + hn::Lanes(d) <= count; x += hn::Lanes(d)) keep_highest_of(d, places, row, x);
-  for (; x < count; ++x) keep_highest_of(single, places, row, x);
+  for (; x + hn::Lanes(d) <= count; x += hn::Lanes(d)) keep_highest_of(d, previous, places, row, x);
+  for (; x < count; ++x) keep_highest_of(single, previous, places, row, x);
+}
+
+Extremes ExtremesOf(const float* rise, const std::int32_t* best, std::size_t count) {
+  const Floats d;
+  const hn::RebindToSigned<Floats> integers;
+  Extremes extremes{rise[0], best[0]};
+  std::size_t x = 0;
+  if (count >= hn::Lanes(d)) {
+    auto lowest = hn::LoadU(d, rise);
+    auto latest = hn::LoadU(integers, best);
+    for (; x + hn::Lanes(d) <= count; x += hn::Lanes(d)) {
+      lowest = hn::Min(lowest, hn::LoadU(d, rise + x));
+      latest = hn::Max(latest, hn::LoadU(integers, best + x));
+    }
+    extremes = {hn::GetLane(hn::MinOfLanes(d, lowest)), hn::GetLane(hn::MaxOfLanes(integers, latest))};
+  }
+  for (; x < count; ++x) extremes = {std::min(extremes.lowest_rise, rise[x]), std::max(extremes.latest_best, best[x])};
+  return extremes;
 }
 
 /// As many vectors as they have lanes become the vectors of their first, second, ... lanes: each pass turns the
@@ -203,6 +227,7 @@ HWY_EXPORT(SumRows16);
 HWY_EXPORT(CountClipped8);
 HWY_EXPORT(CountClipped16);
 HWY_EXPORT(KeepHighest);
+HWY_EXPORT(ExtremesOf);
 HWY_EXPORT(TransposeRows8);
 HWY_EXPORT(TransposeRows16);
 HWY_EXPORT(TakeOff8);
@@ -226,8 +251,12 @@ void count_clipped_rows(std::span<const std::uint16_t* const> rows, std::uint16_
   HWY_DYNAMIC_DISPATCH(CountClipped16)(rows, saturation, counts);
 }
 
-void keep_highest(std::span<const Place> places, const HighestRow& highest, std::size_t count) {
-  HWY_DYNAMIC_DISPATCH(KeepHighest)(places, highest, count);
+void keep_highest(const Place* previous, std::span<const Place> places, const HighestRow& highest, std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(KeepHighest)(previous, places, highest, count);
+}
+
+Extremes extremes_of(const float* rise, const std::int32_t* best, std::size_t count) {
+  return HWY_DYNAMIC_DISPATCH(ExtremesOf)(rise, best, count);
 }
 
 void transpose_rows(std::span<const std::uint8_t* const> rows, int left, std::uint8_t* out, std::size_t stride) {

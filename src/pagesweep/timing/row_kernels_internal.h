@@ -24,11 +24,18 @@ struct HighestRow {
   float* rise;         ///< the highest; minus infinity before the first
   float* before;       ///< the one before it
   float* after;        ///< the one after it
-  float* last;         ///< of the place looked at last
   std::int32_t* best;  ///< place of the highest
 };
 /// Looks at the next places of `count` pixels. The first of equal responses is the highest.
-void keep_highest(std::span<const Place> places, const HighestRow& highest, std::size_t count);
+/// \param previous  the place before the first one; null: there is none
+void keep_highest(const Place* previous, std::span<const Place> places, const HighestRow& highest, std::size_t count);
+
+/// Of `count` pixels.
+struct Extremes {
+  float lowest_rise;
+  std::int32_t latest_best;
+};
+Extremes extremes_of(const float* rise, const std::int32_t* best, std::size_t count);
 
 /// Adds to counts[x] in how many rows row[x] >= saturation, up to 255.
 void count_clipped_rows(std::span<const std::uint8_t* const> rows, std::uint8_t saturation,

@@ -121,12 +121,14 @@ TEST(KeepHighest, RemembersTheHighestAndThoseBesideIt) {
     SCOPED_TRACE(hwy::TargetName(target));
     hwy::SetSupportedTargetsForTest(target);
     std::vector<float> rise(count, -std::numeric_limits<float>::infinity());
-    std::vector<float> before(count, nan), after(count, nan), last(count, nan);
+    std::vector<float> before(count, nan), after(count, nan);
     std::vector<std::int32_t> best(count, -1);
     for (const auto& [begin, end] : {std::pair{0, 4}, std::pair{4, 5}, std::pair{5, places}}) {
       std::vector<Place> step;
       for (int k = begin; k < end; ++k) step.push_back(place_at(k));
-      keep_highest(step, {rise.data(), before.data(), after.data(), last.data(), best.data()}, count);
+      const Place previous = place_at(std::max(0, begin - 1));
+      keep_highest(begin > 0 ? &previous : nullptr, step, {rise.data(), before.data(), after.data(), best.data()},
+                   count);
     }
     for (std::size_t x = 0; x < count; ++x) {
       int highest = 0;
@@ -134,9 +136,27 @@ TEST(KeepHighest, RemembersTheHighestAndThoseBesideIt) {
         if (response(k, x) > response(highest, x)) highest = k;
       EXPECT_EQ(best[x], highest) << x;
       EXPECT_EQ(rise[x], response(highest, x)) << x;
-      EXPECT_EQ(last[x], response(places - 1, x)) << x;
       EXPECT_TRUE(highest == 0 ? std::isnan(before[x]) : before[x] == response(highest - 1, x)) << x;
       EXPECT_TRUE(highest + 1 == places ? std::isnan(after[x]) : after[x] == response(highest + 1, x)) << x;
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
+TEST(ExtremesOf, AreThoseOfAllPixels) {
+  std::vector<float> rise;
+  std::vector<std::int32_t> best;
+  for (std::size_t x = 0; x < 45; ++x) {
+    rise.push_back(static_cast<float>(testing::uniform(3, x)));
+    best.push_back(static_cast<std::int32_t>(100 * testing::uniform(4, x)));
+  }
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    for (std::size_t count = 1; count <= rise.size(); ++count) {
+      const Extremes extremes = extremes_of(rise.data(), best.data(), count);
+      EXPECT_EQ(extremes.lowest_rise, *std::min_element(rise.begin(), rise.begin() + static_cast<int>(count)));
+      EXPECT_EQ(extremes.latest_best, *std::max_element(best.begin(), best.begin() + static_cast<int>(count)));
     }
   }
   hwy::SetSupportedTargetsForTest(0);

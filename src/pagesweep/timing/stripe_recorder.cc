@@ -21,7 +21,7 @@ constexpr float clear_significance = 7;
 
 /// Counts the frames begin, begin + 1, ... before `end` in which each pixel of row y is clipped.
 template <class T>
-void count_clipped(const Frames& frames, int begin, int end, int y, std::span<std::uint8_t> counts) {
+void count_clipped_of(const Frames& frames, int begin, int end, int y, std::span<std::uint8_t> counts) {
   const double saturation = std::max(0.0, std::ceil(frames.sequence().saturation));
   if (saturation > std::numeric_limits<T>::max()) return;
   RowsOf<T> rows;
@@ -61,6 +61,7 @@ bool StripeRecorder::can_record(const Sequence& sequence) {
 
 StripeRecorder::StripeRecorder(const Sequence& sequence, double fwhm, int half, double read_variance)
     : search_(sequence.width, sequence.height, fwhm, read_variance),
+      quiet_(sequence.width, sequence.height, search_.block()),
       windows_(sequence, half),
       recorded_place_(sequence.width, sequence.height, -1),
       tiles_(width_tiles(sequence.width), width_tiles(sequence.height)),
@@ -97,6 +98,7 @@ void StripeRecorder::look(const Frames& frames, int end, bool ended) {
   step.begin = first_needed();
   step.end = end;
   step.news = frames_done_;
+  step.is_first = frames_done_ == 0;
   present_.resize(static_cast<std::size_t>(end), 0);
   late_.resize(static_cast<std::size_t>(end), 0);
   for (int i = frames_done_; i < end; ++i) {
@@ -110,6 +112,7 @@ void StripeRecorder::look(const Frames& frames, int end, bool ended) {
   bool any = false;
   for (int i = step.begin; i < end; ++i) any = any || frames.has(i);
   if (!any) return;
+  quiet_.begin_step(step.news, end, !step.is_first);
   parallel_ranges(windows_.sequence().height, tile_px,
                   [&](int begin_row, int end_row) { look_at_rows(frames, step, begin_row, end_row); });
   places_done_ = step.search.end_place;
@@ -118,19 +121,43 @@ void StripeRecorder::look(const Frames& frames, int end, bool ended) {
 }
 
 void StripeRecorder::look_at_rows(const Frames& frames, const Step& step, int first_row, int end_row) {
-  const Sequence& sequence = windows_.sequence();
   for (Tile& tile : tiles_.row(first_row / tile_px)) tile.waiting = 0;
   Scratch scratch;
   // The kernel fills whole vectors.
   scratch.tile.resize(static_cast<std::size_t>((tile_pixels + 1) * (windows_.length() + most_apart + tile_pixels)));
   for (int y = first_row; y < end_row; ++y) {
-    if (sequence.is_8_bit())
-      count_clipped<std::uint8_t>(frames, step.news, step.end, y, clipped_.row(y));
-    else
-      count_clipped<std::uint16_t>(frames, step.news, step.end, y, clipped_.row(y));
     const RawRow rows = raw_row(frames, y, step.begin, step.end);
-    search_.look(step.search, rows, step.begin, y, scratch.sums);
-    for (int left = 0; left < sequence.width; left += tile_pixels) record(step, rows, y, left, scratch);
+    if (!step.is_first) quiet_.note(y, rows, step.begin);
+    count_clipped(frames, step, y);
+    search(step, rows, y, scratch);
+  }
+}
+
+void StripeRecorder::count_clipped(const Frames& frames, const Step& step, int y) {
+  if (!step.is_first && quiet_.highest(y) < frames.sequence().saturation) return;
+  if (frames.sequence().is_8_bit())
+    count_clipped_of<std::uint8_t>(frames, step.news, step.end, y, clipped_.row(y));
+  else
+    count_clipped_of<std::uint16_t>(frames, step.news, step.end, y, clipped_.row(y));
+}
+
+void StripeRecorder::search(const Step& step, const RawRow& rows, int y, Scratch& scratch) {
+  const int width = windows_.sequence().width;
+  const auto left_of = [&](int strip) { return std::min(strip * QuietStrips::strip_px, width); };
+  for (int strip = 0; strip < quiet_.count();) {
+    if (quiet_.is_quiet(strip, y, step.search)) {
+      const bool are_all_recorded = quiet_.latest(strip, y) <= ready_done_;
+      for (int x = left_of(strip); x < left_of(strip + 1) && !are_all_recorded; x += tile_pixels)
+        record(step, rows, y, x, scratch);
+      ++strip;
+      continue;
+    }
+    // Long pieces of rows are read faster than short ones.
+    const int first = strip++;
+    while (strip < quiet_.count() && !quiet_.is_quiet(strip, y, step.search)) ++strip;
+    search_.look(step.search, rows, step.begin, y, left_of(first), left_of(strip) - left_of(first), scratch.sums);
+    for (int x = left_of(first); x < left_of(strip); x += tile_pixels) record(step, rows, y, x, scratch);
+    for (int k = first; k < strip && !step.search.ended; ++k) quiet_.keep(k, y, search_);
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "pagesweep/base/image.h"
 #include "pagesweep/timing/coarse_search_internal.h"
+#include "pagesweep/timing/quiet_strips_internal.h"
 #include "pagesweep/timing/row_kernels_internal.h"
 #include "pagesweep/timing/stripe_windows_internal.h"
 #include "pagesweep/timing/width_tiles_internal.h"
@@ -61,16 +62,20 @@ class StripeRecorder {
     int last_ready;  ///< place; bells there and before are over
     int begin, end;  ///< [frames] that take part
     int news;        ///< [frames] first one that was not there before
+    bool is_first;   ///< nothing was looked at before
   };
   struct Scratch;
   /// Last place whose window ends before frame `end`.
   int last_ready(int end) const;
   void look_at_rows(const Frames& frames, const Step& step, int first_row, int end_row);
+  void count_clipped(const Frames& frames, const Step& step, int y);
+  void search(const Step& step, const RawRow& rows, int y, Scratch& scratch);
   void record(const Step& step, const RawRow& rows, int y, int left, Scratch& scratch);
   template <class T>
   void cut(const Step& step, const RowsOf<T>& rows, int y, int left, Scratch& scratch);
 
   CoarseSearch search_;
+  QuietStrips quiet_;
   StripeWindows windows_;
   Image<std::int32_t> recorded_place_;  ///< of each pixel's window
   Image<Tile> tiles_;
