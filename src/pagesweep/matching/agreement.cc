@@ -65,6 +65,7 @@ bool is_confirmed(const Correspondences& matches, const Found& other, int x, int
 void judge(const Found& there, const Found& back, double max_px, const PixelSet* only) {
   Correspondences& matches = *there.matches;
   parallel_rows(matches.height(), [&](int y) {
+    if (!any_takes_part(only, y)) return;
     for (int x = 0; x < matches.width(); ++x) {
       if (!takes_part(only, x, y) || (*there.status)(x, y) != PixelStatus::ok) continue;
       const bool confirmed = is_confirmed(matches, back, x, y, max_px);

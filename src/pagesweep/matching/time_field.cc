@@ -2,9 +2,10 @@
 #include "pagesweep/matching/time_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "pagesweep/base/parallel.h"
@@ -12,28 +13,42 @@
 namespace pagesweep {
 namespace {
 
-constexpr std::uint8_t right = 1, below = 2;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 int blocks_over(int pixels) { return (pixels + time_block_px - 1) / time_block_px; }
 
-/// Whether pixel (x, y) and the one at (x + dx, y + dy) are of one surface.
-bool are_linked(const TimeMap& map, int x, int y, int dx, int dy) {
-  const auto time = [&](int step) {
-    const int column = x + step * dx, row = y + step * dy;
-    return map.time.contains(column, row) ? map.time(column, row) : not_a_number;
-  };
-  const float here = time(0), next = time(1);
-  const float difference = std::abs(next - here);
-  if (!(difference < std::numeric_limits<float>::infinity())) return false;
-  // A jump that the lens smears over two pixels has a steep neighbour on one side at most two pairs away, so each
-  // side's flatter one of two pairs speaks for it. Missing pairs say nothing: fmin and fmax pass over NaN.
-  const float left = std::fmin(std::abs(here - time(-1)), std::abs(time(-1) - time(-2)));
-  const float rest = std::fmin(std::abs(time(2) - next), std::abs(time(3) - time(2)));
-  const float around = std::fmax(left, rest);
-  if (!(around >= 0) || difference <= 3 * around) return true;
-  const float noise = std::hypot(map.sigma(x, y), map.sigma(x + dx, y + dy));
-  return difference <= 3 * around + 6 * noise;
+/// Of two numbers; of what is only one, that.
+float lesser(float a, float b) {
+  const float lower = a < b ? a : b;
+  return b != b ? a : lower;
+}
+float greater(float a, float b) {
+  const float higher = a > b ? a : b;
+  return b != b ? a : higher;
+}
+
+/// Six pixels in a line, for many x side by side: their times, and the sigmas of the middle two.
+struct SixPixels {
+  std::array<const float*, 6> time;
+  std::array<const float*, 2> sigma;
+};
+
+/// 0 where the middle two are of one surface, NaN where not.
+void link(const SixPixels& pixels, int begin, int end, float* linked) {
+  const auto [a, b, c, d, e, f] = pixels.time;
+  const auto [sigma_c, sigma_d] = pixels.sigma;
+  for (int x = begin; x < end; ++x) {
+    const float difference = std::abs(d[x] - c[x]);
+    // A jump that the lens smears over two pixels has a steep neighbour on one side at most two pairs away, so each
+    // side's flatter one of two pairs speaks for it. Missing pairs say nothing.
+    const float before = lesser(std::abs(c[x] - b[x]), std::abs(b[x] - a[x]));
+    const float behind = lesser(std::abs(e[x] - d[x]), std::abs(f[x] - e[x]));
+    const float around = greater(before, behind);
+    const float noise = std::sqrt(sigma_c[x] * sigma_c[x] + sigma_d[x] * sigma_d[x]);
+    const float most = difference <= 3 * around ? 3 * around : 3 * around + 6 * noise;
+    const float allowed = around != around ? infinity : most;
+    linked[x] = difference <= allowed ? 0 : not_a_number;  // a difference of NaN never is
+  }
 }
 
 /// Columns of a row.
@@ -65,11 +80,57 @@ std::vector<Columns> around(const PixelSet* set, int width, int height, int reac
   return wider;
 }
 
+/// Links of a map's pixels to those on the right and below, row by row. It holds scratch memory: one a thread.
+class RowLinks {
+ public:
+  explicit RowLinks(const TimeMap& map)
+      : map_(map),
+        nowhere_(static_cast<std::size_t>(map.width()), not_a_number),
+        row_(static_cast<std::size_t>(map.width() + 2 * padding), not_a_number),
+        sigma_(static_cast<std::size_t>(map.width() + 1), not_a_number),
+        right_(nowhere_.size()),
+        below_(nowhere_.size()),
+        right_below_(nowhere_.size()) {}
+
+  /// 0 where the four pixels from (x, y) to (x + 1, y + 1) are linked, NaN where not.
+  void join(int y, int begin, int end, float* between) {
+    find_right(y, begin, end, right_);
+    find_right(y + 1, begin, end, right_below_);
+    find_below(y, begin, end + 1);
+    const float *right = right_.data(), *below = below_.data(), *right_below = right_below_.data();
+    for (int x = begin; x < end; ++x) between[x] = right[x] + right_below[x] + below[x] + below[x + 1];
+  }
+
+ private:
+  static constexpr int padding = 3;
+
+  void find_right(int y, int begin, int end, std::vector<float>& linked) {
+    std::ranges::copy(map_.time.row(y), row_.begin() + padding);
+    std::ranges::copy(map_.sigma.row(y), sigma_.begin());
+    SixPixels pixels{{}, {sigma_.data(), sigma_.data() + 1}};
+    for (int k = 0; k < 6; ++k) pixels.time[static_cast<std::size_t>(k)] = row_.data() + padding + k - 2;
+    link(pixels, begin, end, linked.data());
+  }
+  void find_below(int y, int begin, int end) {
+    const auto row_of = [&](const Image<float>& values, int row) {
+      return row >= 0 && row < values.height() ? values.row(row).data() : nowhere_.data();
+    };
+    SixPixels pixels{{}, {row_of(map_.sigma, y), row_of(map_.sigma, y + 1)}};
+    for (int k = 0; k < 6; ++k) pixels.time[static_cast<std::size_t>(k)] = row_of(map_.time, y + k - 2);
+    link(pixels, begin, end, below_.data());
+  }
+
+  const TimeMap& map_;
+  std::vector<float> nowhere_, row_, sigma_;
+  std::vector<float> right_, below_, right_below_;
+};
+
+constexpr int rows_at_once = 16;
+
 }  // namespace
 
 TimeField::TimeField(int width, int height)
-    : linked_(width, height),
-      earliest_(blocks_over(width), blocks_over(height), infinity),
+    : earliest_(blocks_over(width), blocks_over(height), infinity),
       latest_(blocks_over(width), blocks_over(height), -infinity),
       earliest_around_(earliest_),
       latest_around_(latest_),
@@ -79,23 +140,15 @@ TimeField::TimeField(const TimeMap& map) : TimeField(map.width(), map.height()) 
 
 void TimeField::update(const TimeMap& map, const PixelSet* news) {
   map_ = &map;
-  constexpr int reach = 3;  // [px] from a pixel whose link depends on another
+  constexpr int reach = 4;  // [px] from a pixel whose links, or those beside it, depend on another
   bound_blocks(news);
-  const auto to_link = around(news, map.width(), map.height(), reach);
-  parallel_rows(map.height(), [&](int y) {
-    const Columns& columns = to_link[static_cast<std::size_t>(y)];
-    for (int x = columns.begin; x < columns.end; ++x) {
-      const unsigned links = (are_linked(map, x, y, 1, 0) ? right : 0u) | (are_linked(map, x, y, 0, 1) ? below : 0u);
-      linked_(x, y) = static_cast<std::uint8_t>(links);
-    }
-  });
-  const auto to_join = around(news, map.width(), map.height(), reach + 1);
-  parallel_rows(std::max(0, map.height() - 1), [&](int y) {
-    const Columns& columns = to_join[static_cast<std::size_t>(y)];
-    for (int x = columns.begin; x < std::min(columns.end, map.width() - 1); ++x) {
-      const bool all = (linked_(x, y) & right) && (linked_(x, y) & below) && (linked_(x + 1, y) & below) &&
-                       (linked_(x, y + 1) & right);
-      between_(x, y) = all ? 0 : not_a_number;
+  const auto to_join = around(news, map.width(), map.height(), reach);
+  parallel_ranges(std::max(0, map.height() - 1), rows_at_once, [&](int begin, int end) {
+    RowLinks links(map);
+    for (int y = begin; y < end; ++y) {
+      const Columns& columns = to_join[static_cast<std::size_t>(y)];
+      const int last = std::min(columns.end, map.width() - 1);
+      if (columns.begin < last) links.join(y, columns.begin, last, between_.row(y).data());
     }
   });
 }

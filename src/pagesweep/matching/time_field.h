@@ -44,7 +44,6 @@ class TimeField {
   Cell cell_at(const Eigen::Vector2d& pixel) const;
 
   const TimeMap* map_ = nullptr;
-  Image<std::uint8_t> linked_;                    ///< each pixel's links to the right and below
   Image<float> earliest_, latest_;                ///< of each block of pixels, and of the row and column behind it
   Image<float> earliest_around_, latest_around_;  ///< see TimeArrays
   Image<float> between_;  ///< 0 where the four pixels from (x, y) to (x + 1, y + 1) are linked, NaN where not

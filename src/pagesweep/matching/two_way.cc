@@ -148,7 +148,9 @@ void TwoWayMatching::match_one_way(const Direction& direction, InverseDepthRange
   for (int top = 0; top < matches.height(); top += band) {
     const int rows = std::min(band, matches.height() - top);
     parallel_ranges(rows, rows_at_once, [&](int begin, int end) {
-      direction.matcher->match_rows(geometry, top + begin, top + end, matches);
+      bool any = false;
+      for (int y = top + begin; y < top + end; ++y) any = any || direction.matcher->wants_any_of(y);
+      if (any) direction.matcher->match_rows(geometry, top + begin, top + end, matches);
     });
     progress.advance(static_cast<double>(top + rows) / matches.height());
   }
@@ -171,6 +173,7 @@ void TwoWayMatching::match(const PixelMatcher& from_first, const PixelMatcher& f
                          Image<PixelStatus>& found) {
     match_one_way(direction, range, progress, matches);
     parallel_rows(matches.height(), [&](int y) {
+      if (!direction.matcher->wants_any_of(y)) return;
       for (int x = 0; x < matches.width(); ++x)
         if (direction.matcher->is_wanted(x, y)) found(x, y) = matches.status(x, y);
     });

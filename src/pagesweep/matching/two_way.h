@@ -47,6 +47,7 @@ class PixelMatcher {
   explicit PixelMatcher(const PixelSet* only = nullptr) : only_(only) {}
   virtual ~PixelMatcher() = default;
   bool is_wanted(int x, int y) const { return takes_part(only_, x, y); }
+  bool wants_any_of(int y) const { return any_takes_part(only_, y); }
   /// Why the pixel cannot be matched at all; ok if it can.
   virtual PixelStatus status_of(int x, int y) const = 0;
   virtual std::unique_ptr<MatchFinder> make_finder() const = 0;

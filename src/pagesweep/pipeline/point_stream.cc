@@ -153,22 +153,38 @@ void PointStream::take_times(const Times& seen, double until) {
   for (std::size_t c = 0; c < sides_.size(); ++c) {
     Side& side = sides_[c];
     if (!step_on(side, *seen[c], none, until)) continue;
+    if (until == infinity) leave_dark(*seen[c], side);
     parallel_rows(side.now.height(), [&](int y) {
-      for (int x = 0; x < side.now.width(); ++x)
-        if (side.now(x, y)) side.taken(x, y) = seen[c]->time(x, y);
+      const float* time = seen[c]->time.row(y).data();
+      const std::uint8_t* now = side.now.row(y).data();
+      float* taken = side.taken.row(y).data();
+      for (int x = 0; x < side.now.width(); ++x) taken[x] = now[x] ? time[x] : taken[x];
     });
     if (steps_.corrects_edges) correct(*seen[c], side);
   }
 }
 
+void PointStream::leave_dark(const TimeMap& seen, Side& side) {
+  parallel_rows(side.now.height(), [&](int y) {
+    for (int x = 0; x < side.now.width(); ++x) {
+      if (!side.now(x, y) || !std::isnan(seen.time(x, y)) || !std::isnan(side.taken(x, y))) continue;
+      side.now(x, y) = 0;
+      side.step(x, y) = finished;
+      side.points.status(x, y) = seen.status(x, y);
+      if (steps_.corrects_edges) copy_pixel(seen, x, y, side.corrected);
+    }
+  });
+}
+
 void PointStream::correct(const TimeMap& seen, Side& side) {
   parallel_rows(side.now.height(), [&](int y) {
+    if (!any_takes_part(&side.now, y)) return;
     for (int x = 0; x < side.now.width(); ++x)
       if (side.now(x, y)) copy_pixel(seen, x, y, side.corrected);
   });
-  const auto comparisons = compare_with_surroundings(seen, offsets_from_amplitude(seen, &side.now), &side.now);
+  const auto comparisons = compare_by_amplitude(seen, &side.now);
   side.edges.add(seen, comparisons);
-  side.correction = side.edges.fit();
+  if (side.edges.has_news()) side.correction = side.edges.fit();
   correct_edges(side.corrected, comparisons, side.correction);
 }
 
@@ -189,7 +205,10 @@ void PointStream::fuse(double until) {
   for (std::size_t c = 0; c < sides_.size(); ++c) {
     const Side& side = sides_[c];
     stereo[c] = PixelSet(side.now.width(), side.now.height());
-    for (std::size_t i = 0; i < side.step.size(); ++i) stereo[c].data()[i] = side.step.data()[i] == located;
+    parallel_rows(side.now.height(), [&](int y) {
+      std::ranges::transform(side.step.row(y), stereo[c].row(y).begin(),
+                             [](std::uint8_t step) { return step == located; });
+    });
   }
   if (!step_on(located, until) || !sweep_) return;
   const MatchPair& matches = matching_.matches();
@@ -212,11 +231,16 @@ void PointStream::forget_changed(const Times& seen) {
     const Side& side = sides_[c];
     changed[c].resize(static_cast<std::size_t>(side.step.height()));
     parallel_rows(side.step.height(), [&](int y) {
-      for (int x = 0; x < side.step.width(); ++x) {
-        const float change = std::abs(seen[c]->time(x, y) - side.taken(x, y));
-        if (side.step(x, y) != none && !(change < little * seen[c]->sigma(x, y)))
-          changed[c][static_cast<std::size_t>(y)].push_back(x);
-      }
+      const float *time = seen[c]->time.row(y).data(), *sigma = seen[c]->sigma.row(y).data();
+      const float* taken = side.taken.row(y).data();
+      const std::uint8_t* step = side.step.row(y).data();
+      const auto has_changed = [&](int x) {
+        return (step[x] != none) & !(std::abs(time[x] - taken[x]) < little * sigma[x]);
+      };
+      int any = 0;
+      for (int x = 0; x < side.step.width(); ++x) any |= has_changed(x);  // hardly ever
+      for (int x = 0; any && x < side.step.width(); ++x)
+        if (has_changed(x)) changed[c][static_cast<std::size_t>(y)].push_back(x);
     });
   }
   const MatchPair& pair = matching_.matches();

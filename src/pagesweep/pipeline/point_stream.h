@@ -61,6 +61,8 @@ class PointStream {
 
   void go_on(const Times& seen, double until, Progress& progress);
   void take_times(const Times& seen, double until);
+  /// Of pixels that never had a time, only the reason is known.
+  void leave_dark(const TimeMap& seen, Side& side);
   void correct(const TimeMap& seen, Side& side);
   void locate(double until);
   void fuse(double until);

@@ -130,7 +130,7 @@ void finish_points(const Stage& stage, Measurement& measurement) {
 void correct_by_amplitude(const std::vector<TimeMap>& seen, Measurement& measurement) {
   measurement.edges.clear();
   for (std::size_t c = 0; c < seen.size(); ++c) {
-    const auto comparisons = compare_with_surroundings(seen[c], offsets_from_amplitude(seen[c]));
+    const auto comparisons = compare_by_amplitude(seen[c]);
     measurement.edges.push_back(fit_edges(seen[c], comparisons));
     correct_edges(measurement.timing->maps[c], comparisons, measurement.edges[c]);
   }

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "pagesweep/base/local_plane.h"
 #include "pagesweep/base/parallel.h"
@@ -23,26 +26,57 @@ float derivative(float before2, float before, float after, float after2) {
   return std::isfinite(wide) ? (4 * narrow - wide) / 3 : narrow;
 }
 
+/// The offsets of a row of pixels [px].
+struct RowOffsets {
+  std::span<const float> dx, dy;
+};
+
+/// Derivatives of the logarithm of the amplitude, row by row. It holds scratch memory: one a thread.
+class AmplitudeOffsets {
+ public:
+  explicit AmplitudeOffsets(const TimeMap& times)
+      : times_(times), dx_(static_cast<std::size_t>(times.width())), dy_(dx_.size()) {}
+
+  RowOffsets row(int y) {
+    for (int x = 0; x < times_.width(); ++x) {
+      const auto k = static_cast<std::size_t>(x);
+      const float here = amplitude(x, y);
+      dx_[k] = derivative(amplitude(x - 2, y), amplitude(x - 1, y), amplitude(x + 1, y), amplitude(x + 2, y)) / here;
+      dy_[k] = derivative(amplitude(x, y - 2), amplitude(x, y - 1), amplitude(x, y + 1), amplitude(x, y + 2)) / here;
+    }
+    return {dx_, dy_};
+  }
+
+ private:
+  float amplitude(int x, int y) const {
+    return times_.amplitude.contains(x, y) && times_.status(x, y) == PixelStatus::ok ? times_.amplitude(x, y)
+                                                                                     : not_a_number;
+  }
+
+  const TimeMap& times_;
+  std::vector<float> dx_, dy_;
+};
+
 class Surroundings {
  public:
-  Surroundings(const TimeMap& times, const SpotOffsets& offsets) : times_(times), offsets_(offsets) {}
+  Surroundings(const TimeMap& times, const RowOffsets& offsets) : times_(times), offsets_(offsets) {}
 
   /// Whether there may be something to compare.
   bool are_worth_it(int x, int y) const {
-    const float dx = offsets_.dx(x, y), dy = offsets_.dy(x, y);
+    const auto [dx, dy] = offset(x);
     if (times_.status(x, y) != PixelStatus::ok || !(std::abs(dx) + std::abs(dy) < largest_offset_px)) return false;
     const float least = least_leaning * times_.sigma(x, y);
     return !((dx * dx + dy * dy) * frames_a_pixel_squared(x, y).most < least * least);
   }
 
   /// What is compared of the pixels of a row that are worth it.
-  void look(PlaneBatch& planes, EdgeComparisons& comparisons) {
-    fitter_.fit(times_.time, planes);
-    const auto are_one_surface = fitter_.are_one_surface(times_.sigma, planes);
+  void look(PlaneBatch& planes, PlaneFitter& fitter, EdgeComparisons& comparisons) const {
+    fitter.fit(times_.time, planes);
+    const auto are_one_surface = fitter.are_one_surface(times_.sigma, planes);
     for (std::size_t k = 0; k < planes.count; ++k) {
       if (!planes.found(k)) continue;
       const int x = planes.column[k], y = planes.row;
-      const float dx = offsets_.dx(x, y), dy = offsets_.dy(x, y);
+      const auto [dx, dy] = offset(x);
       comparisons.push_back({x, y, -planes.middle[k], dx * planes.across[k] + dy * planes.down[k],
                              std::sqrt(dx * dx + dy * dy), std::sqrt(frames_a_pixel_squared(x, y).least),
                              are_one_surface[k]});
@@ -50,6 +84,9 @@ class Surroundings {
   }
 
  private:
+  std::pair<float, float> offset(int x) const {
+    return {offsets_.dx[static_cast<std::size_t>(x)], offsets_.dy[static_cast<std::size_t>(x)]};
+  }
   struct Range {
     float least, most;
   };
@@ -73,9 +110,33 @@ class Surroundings {
   }
 
   const TimeMap& times_;
-  const SpotOffsets& offsets_;
-  PlaneFitter fitter_{3};
+  RowOffsets offsets_;
 };
+
+/// \param row_of  gives the offsets of row y, which last until the next
+template <class RowOf>
+void compare_row(const TimeMap& times, int y, const PixelSet* only, const RowOf& row_of, PlaneFitter& fitter,
+                 EdgeComparisons& comparisons) {
+  if (!any_takes_part(only, y)) return;
+  const Surroundings surroundings(times, row_of(y));
+  const auto are_worth_it = [&](int x) { return takes_part(only, x, y) && surroundings.are_worth_it(x, y); };
+  in_batches(times.width(), y, are_worth_it,
+             [&](PlaneBatch& planes) { surroundings.look(planes, fitter, comparisons); });
+}
+
+/// \param compare  appends what is compared of the rows begin ... end - 1
+EdgeComparisons gather_rows(int height, const std::function<void(int begin, int end, EdgeComparisons&)>& compare) {
+  constexpr int rows_at_once = 8;
+  std::vector<EdgeComparisons> parts(static_cast<std::size_t>((height + rows_at_once - 1) / rows_at_once));
+  parallel_ranges(height, rows_at_once, [&](int begin, int end) {
+    compare(begin, end, parts[static_cast<std::size_t>(begin / rows_at_once)]);
+  });
+  EdgeComparisons all;
+  for (const EdgeComparisons& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+constexpr int plane_radius_px = 3;
 
 }  // namespace
 
@@ -86,21 +147,13 @@ struct EdgeFit::Sums {
   long long count = 0;
 };
 
-SpotOffsets offsets_from_amplitude(const TimeMap& times, const PixelSet* only) {
+SpotOffsets offsets_from_amplitude(const TimeMap& times) {
   SpotOffsets offsets(times.width(), times.height());
   parallel_rows(times.height(), [&](int y) {
-    const auto amplitude = [&](int x, int row) {
-      return times.amplitude.contains(x, row) && times.status(x, row) == PixelStatus::ok ? times.amplitude(x, row)
-                                                                                         : not_a_number;
-    };
-    for (int x = 0; x < times.width(); ++x) {
-      if (!takes_part(only, x, y)) continue;
-      const float here = amplitude(x, y);
-      offsets.dx(x, y) =
-          derivative(amplitude(x - 2, y), amplitude(x - 1, y), amplitude(x + 1, y), amplitude(x + 2, y)) / here;
-      offsets.dy(x, y) =
-          derivative(amplitude(x, y - 2), amplitude(x, y - 1), amplitude(x, y + 1), amplitude(x, y + 2)) / here;
-    }
+    AmplitudeOffsets amplitudes(times);
+    const auto [dx, dy] = amplitudes.row(y);
+    std::ranges::copy(dx, offsets.dx.row(y).begin());
+    std::ranges::copy(dy, offsets.dy.row(y).begin());
   });
   return offsets;
 }
@@ -108,19 +161,20 @@ SpotOffsets offsets_from_amplitude(const TimeMap& times, const PixelSet* only) {
 EdgeComparisons compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets, const PixelSet* only) {
   if (times.width() != offsets.width() || times.height() != offsets.height())
     throw std::invalid_argument("edge correction: time map and offsets differ in size");
-  std::vector<EdgeComparisons> rows(static_cast<std::size_t>(times.height()));
-  constexpr int rows_at_once = 8;
-  parallel_ranges(times.height(), rows_at_once, [&](int begin, int end) {
-    Surroundings surroundings(times, offsets);
-    for (int y = begin; y < end; ++y) {
-      const auto are_worth_it = [&](int x) { return takes_part(only, x, y) && surroundings.are_worth_it(x, y); };
-      in_batches(times.width(), y, are_worth_it,
-                 [&](PlaneBatch& planes) { surroundings.look(planes, rows[static_cast<std::size_t>(y)]); });
-    }
+  const auto row_of = [&](int y) { return RowOffsets{offsets.dx.row(y), offsets.dy.row(y)}; };
+  return gather_rows(times.height(), [&](int begin, int end, EdgeComparisons& comparisons) {
+    PlaneFitter fitter(plane_radius_px);
+    for (int y = begin; y < end; ++y) compare_row(times, y, only, row_of, fitter, comparisons);
   });
-  EdgeComparisons all;
-  for (const EdgeComparisons& row : rows) all.insert(all.end(), row.begin(), row.end());
-  return all;
+}
+
+EdgeComparisons compare_by_amplitude(const TimeMap& times, const PixelSet* only) {
+  return gather_rows(times.height(), [&](int begin, int end, EdgeComparisons& comparisons) {
+    PlaneFitter fitter(plane_radius_px);
+    AmplitudeOffsets amplitudes(times);
+    const auto row_of = [&](int y) { return amplitudes.row(y); };
+    for (int y = begin; y < end; ++y) compare_row(times, y, only, row_of, fitter, comparisons);
+  });
 }
 
 void EdgeFit::add(const TimeMap& times, const EdgeComparisons& comparisons) {
@@ -148,7 +202,8 @@ EdgeFit::Sums EdgeFit::gather(double gain, double limit) const {
   return sums;
 }
 
-EdgeCorrection EdgeFit::fit() const {
+EdgeCorrection EdgeFit::fit() {
+  fitted_ = edges_.size();
   constexpr double widest = 20, usual = 6;
   EdgeCorrection correction;
   // Outliers are what the last gain leaves far away; the limit narrows as the gain gets better.

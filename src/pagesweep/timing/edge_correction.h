@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "pagesweep/data/pixel_set.h"
@@ -12,8 +13,7 @@ namespace pagesweep {
 /// The spots' middles as the amplitudes tell them, for a point spread function of variance 1 px^2: the gradient of the
 /// logarithm of the amplitude (Tweedie's formula; B. Efron, Tweedie's formula and selection bias, 2011). For a Gaussian
 /// point spread function it is exact up to the amplitudes' noise and sampling. See docs/derivations/edges.md.
-/// \param only  other pixels get none; null: all pixels
-SpotOffsets offsets_from_amplitude(const TimeMap& times, const PixelSet* only = nullptr);
+SpotOffsets offsets_from_amplitude(const TimeMap& times);
 
 /// How one pixel's time compares with the plane through those around it.
 struct EdgeComparison {
@@ -32,6 +32,8 @@ using EdgeComparisons = std::vector<EdgeComparison>;
 /// \param only  other pixels are not compared; null: all pixels
 EdgeComparisons compare_with_surroundings(const TimeMap& times, const SpotOffsets& offsets,
                                           const PixelSet* only = nullptr);
+/// With offsets_from_amplitude().
+EdgeComparisons compare_by_amplitude(const TimeMap& times, const PixelSet* only = nullptr);
 
 /// What a map of time values says about spot offsets.
 struct EdgeCorrection {
@@ -48,7 +50,9 @@ class EdgeFit {
  public:
   /// \param times  those that were compared
   void add(const TimeMap& times, const EdgeComparisons& comparisons);
-  EdgeCorrection fit() const;
+  EdgeCorrection fit();
+  /// Whether so many edges have come since the last fit that the next one can be another: a hundredth.
+  bool has_news() const { return 100 * (edges_.size() - fitted_) > edges_.size(); }
 
  private:
   struct Edge {
@@ -58,6 +62,7 @@ class EdgeFit {
   Sums gather(double gain, double limit) const;
 
   std::vector<Edge> edges_;
+  std::size_t fitted_ = 0;  ///< how many there were at the last fit
 };
 
 /// The fit to all pixels that were compared.

@@ -104,7 +104,7 @@ TEST(EdgeCorrection, OffsetsThatExplainNothingChangeNothing) {
 TEST(EdgeCorrection, AtAStepInDepthOnlySigmaGrows) {
   TimeMap map = printed_page(true);
   const TimeMap before = map;
-  const auto comparisons = compare_with_surroundings(map, offsets_from_amplitude(map));
+  const auto comparisons = compare_by_amplitude(map);
   correct_edges(map, comparisons, fit_edges(map, comparisons));
   for (int y = 4; y < 60; ++y) {
     EXPECT_EQ(map.time(31, y), before.time(31, y));

@@ -22,9 +22,14 @@ namespace {
 /// pixels beside bright ones seem to say is the bright ones' stray light.
 class Lateness {
  public:
-  Lateness(const PointMap& points, const TimeMap& times, const SeenLight& light, const PixelSet* stereo)
+  /// \param only    pixels that are asked for; null: all
+  /// \param stereo  pixels that say something; null: all
+  Lateness(const PointMap& points, const TimeMap& times, const SeenLight& light, const PixelSet* only,
+           const PixelSet* stereo)
       : tiles_((times.width() + tile - 1) / tile, (times.height() + tile - 1) / tile) {
+    const std::vector<std::uint8_t> matters = rows_near(only);
     parallel_rows(tiles_.height(), [&](int row) {
+      if (!matters[static_cast<std::size_t>(row)]) return;
       std::vector<Voice> voices;
       for (int column = 0; column < tiles_.width(); ++column) {
         gather(points, times, light, stereo, column, row, voices);
@@ -63,6 +68,17 @@ class Lateness {
     float late = 0;    ///< [frames]
     float weight = 0;  ///< [1/frames^2]
   };
+
+  /// Which rows of tiles have a say in pixels of the set.
+  std::vector<std::uint8_t> rows_near(const PixelSet* set) const {
+    std::vector<std::uint8_t> near(static_cast<std::size_t>(tiles_.height()), set == nullptr);
+    for (int y = 0; set && y < set->height(); ++y)
+      if (any_takes_part(set, y))
+        for (int row = std::max(0, y / tile - reach - 1); row <= std::min(y / tile + reach + 1, tiles_.height() - 1);
+             ++row)
+          near[static_cast<std::size_t>(row)] = 1;
+    return near;
+  }
 
   static void gather(const PointMap& points, const TimeMap& times, const SeenLight& light, const PixelSet* stereo,
                      int column, int row, std::vector<Voice>& voices) {
@@ -140,7 +156,7 @@ bool may_be_sectioned(PixelStatus status) {
 class Fusion {
  public:
   Fusion(const PointMap& points, const Correspondences& matches, const TimeMap& times, const RayTable& camera,
-         const Light& light, const TriangulationOptions& options, const PixelSet* stereo)
+         const Light& light, const TriangulationOptions& options, const PixelSet* only, const PixelSet* stereo)
       : matches_(matches),
         times_(times),
         rays_(camera),
@@ -148,7 +164,7 @@ class Fusion {
         center_(camera.camera().center()),
         rig_from_cam_(camera.camera().cam_from_rig.rotation.transpose()),
         light_(light, center_),
-        lateness_(points, times, light_, stereo) {}
+        lateness_(points, times, light_, only, stereo) {}
 
   void put_row(PointMap& points, int y, const PixelSet* only, PlaneFitter& around, FusionCounts& counts) const {
     std::array<Estimate, PlaneBatch::most> sheets;
@@ -267,12 +283,13 @@ FusionCounts fuse_light(PointMap& points, const Correspondences& matches, const 
   if (!fits(points.width(), points.height()) || !fits(matches.width(), matches.height()) ||
       !fits(times.width(), times.height()))
     throw std::invalid_argument("fuse_light: points, matches or times are not of the camera's size");
-  const Fusion fusion(points, matches, times, camera, light, options, stereo);
+  const Fusion fusion(points, matches, times, camera, light, options, only, stereo);
   std::vector<FusionCounts> rows(static_cast<std::size_t>(camera.height()));
   constexpr int rows_at_once = 8, radius = 2;
   parallel_ranges(camera.height(), rows_at_once, [&](int begin, int end) {
     PlaneFitter around(radius);
-    for (int y = begin; y < end; ++y) fusion.put_row(points, y, only, around, rows[static_cast<std::size_t>(y)]);
+    for (int y = begin; y < end; ++y)
+      if (any_takes_part(only, y)) fusion.put_row(points, y, only, around, rows[static_cast<std::size_t>(y)]);
   });
   FusionCounts all;
   for (const FusionCounts& row : rows) all += row;

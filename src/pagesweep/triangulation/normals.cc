@@ -34,14 +34,15 @@ Eigen::Vector3f normal_of(const LocalPlane& plane, const RayTable& rays, int x, 
 Image<float> inverse_depths(const PointMap& points, const Camera& camera, const PixelSet* only, int reach) {
   std::vector<std::uint8_t> takes_part(static_cast<std::size_t>(points.height()), only == nullptr);
   for (int y = 0; only && y < points.height(); ++y)
-    if (std::ranges::any_of(only->row(y), [](std::uint8_t pixel) { return pixel != 0; }))
+    if (any_takes_part(only, y))
       for (int i = std::max(0, y - reach); i <= std::min(y + reach, points.height() - 1); ++i)
         takes_part[static_cast<std::size_t>(i)] = 1;
   Image<float> inverse_depth(points.width(), points.height(), not_a_number);
   const Eigen::Vector3d axis = camera.cam_from_rig.rotation.row(2);
   const double offset = camera.cam_from_rig.translation.z();
   parallel_rows(points.height(), [&](int y) {
-    for (int x = 0; takes_part[static_cast<std::size_t>(y)] && x < points.width(); ++x) {
+    if (!takes_part[static_cast<std::size_t>(y)]) return;
+    for (int x = 0; x < points.width(); ++x) {
       if (points.status(x, y) != PixelStatus::ok) continue;
       const Eigen::Vector3d point(points.x(x, y), points.y(x, y), points.z(x, y));
       inverse_depth(x, y) = static_cast<float>(1 / (axis.dot(point) + offset));
@@ -79,6 +80,7 @@ void fit_normals(PointMap& points, const RayTable& camera, int radius_px, const 
   parallel_ranges(points.height(), rows_at_once, [&](int begin, int end) {
     PlaneFitter fitter(radius_px);
     for (int y = begin; y < end; ++y) {
+      if (!any_takes_part(only, y)) continue;
       const auto is_wanted = [&](int x) { return points.status(x, y) == PixelStatus::ok && takes_part(only, x, y); };
       in_batches(points.width(), y, is_wanted, [&](PlaneBatch& planes) {
         fitter.fit(inverse_depth, planes);

@@ -85,7 +85,8 @@ void triangulate(const Correspondences& matches, const RayTable& from, const Ray
     throw std::invalid_argument("triangulate: matches or points are not of the camera's size");
   parallel_ranges(from.height(), 16, [&](int begin, int end) {
     Triangulator triangulator(from, to, options);
-    for (int y = begin; y < end; ++y) triangulator.put_row(matches, y, only, points);
+    for (int y = begin; y < end; ++y)
+      if (any_takes_part(only, y)) triangulator.put_row(matches, y, only, points);
   });
 }
 
