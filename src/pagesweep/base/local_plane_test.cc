@@ -3,12 +3,15 @@
 
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
+
+#include "pagesweep/base/instruction_sets_testing.h"
 
 namespace pagesweep {
 namespace {
@@ -62,7 +65,6 @@ class PlaneFitterTest : public testing::Test {
         values(x, y) = random() % 11 == 0 ? nan : 50 + 0.3f * static_cast<float>(x) + step + noise(random);
       }
   }
-  ~PlaneFitterTest() override { hwy::SetSupportedTargetsForTest(0); }
 
   struct Place {
     double i, j, value, sigma;
@@ -128,9 +130,7 @@ class PlaneFitterTest : public testing::Test {
 };
 
 TEST_F(PlaneFitterTest, FitsAsAPlainLoopDoesOnAllInstructionSets) {
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  on_every_instruction_set([&] {
     PlaneFitter fitter(radius);
     int fitted = 0, on_one_surface = 0;
     for (int y = 0; y < values.height(); ++y) {
@@ -147,7 +147,7 @@ TEST_F(PlaneFitterTest, FitsAsAPlainLoopDoesOnAllInstructionSets) {
     EXPECT_GT(fitted, 700);
     EXPECT_GT(on_one_surface, 500);
     EXPECT_LT(on_one_surface, fitted - 30);  // the step
-  }
+  });
 }
 
 }  // namespace
