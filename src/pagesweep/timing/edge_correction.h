@@ -51,8 +51,8 @@ class EdgeFit {
   /// \param times  those that were compared
   void add(const TimeMap& times, const EdgeComparisons& comparisons);
   EdgeCorrection fit();
-  /// Whether so many edges have come since the last fit that the next one can be another: a hundredth.
-  bool has_news() const { return 100 * (edges_.size() - fitted_) > edges_.size(); }
+  /// Whether the next fit can be another than the last one.
+  bool has_news() const { return edges_.size() > fitted_; }
 
  private:
   struct Edge {
