@@ -11,15 +11,19 @@
 #include <vector>
 
 #include "pagesweep/base/b_spline.h"
+#include "pagesweep/base/parallel.h"
 
 namespace pagesweep {
 namespace {
 
 /// A point and when the light passed it.
 struct Crossing {
-  Eigen::Vector3d point;  ///< [mm] rig frame, later along (e, f, z)
-  double time;            ///< [frames]
-  double weight;          ///< [1/mm^2]
+  Eigen::Vector3d point;              ///< [mm] rig frame, later along (e, f, z)
+  double time;                        ///< [frames]
+  double weight;                      ///< [1/mm^2]
+  double relative = 0;                ///< the time from -1 to 1
+  int first = 0;                      ///< of the four splines at that time,
+  std::array<double, 4> spline = {};  ///< and their values
 };
 
 /// Direction over the table in which time grows, from a straight line fit of time to place.
@@ -41,7 +45,14 @@ class SweepFit {
   SweepFit(std::vector<Crossing> crossings, double begin, double end, const Eigen::Vector3d& along)
       : crossings_(std::move(crossings)), begin_(begin), end_(end), splines_(breaks(begin, end)), along_(along) {
     const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(along_);
-    for (Crossing& s : crossings_) s.point = {along_.dot(s.point), across.dot(s.point), s.point.z()};
+    for_each_crossing([&](std::size_t k) {
+      Crossing& s = crossings_[k];
+      s.point = {along_.dot(s.point), across.dot(s.point), s.point.z()};
+      s.relative = relative(s.time);
+      const BSplineRow row = splines_.at(s.time);
+      s.first = row.first;
+      std::copy_n(row.value.begin(), 4, s.spline.begin());
+    });
   }
 
   /// Robust fit: Tukey's weights on the residual over a scale from its median.
@@ -51,10 +62,10 @@ class SweepFit {
       solve(robust);
       scale_ = 1.4826 * median_residual();
       const double limit = 4.7 * std::max(scale_, 1e-6);
-      for (std::size_t k = 0; k < crossings_.size(); ++k) {
+      for_each_crossing([&](std::size_t k) {
         const double part = residual(crossings_[k]) / limit;
         robust[k] = std::abs(part) < 1 ? std::pow(1 - part * part, 2) : 0;
-      }
+      });
     }
     used_ = std::count_if(robust.begin(), robust.end(), [](double w) { return w > 0; });
   }
@@ -99,6 +110,13 @@ class SweepFit {
     for (int i = 0; i <= intervals; ++i) values.push_back(begin + i * (end - begin) / intervals);
     return values;
   }
+  /// On all threads.
+  template <class Body>
+  void for_each_crossing(const Body& body) const {
+    parallel_ranges(static_cast<int>(crossings_.size()), 4096, [&](int begin, int end) {
+      for (int k = begin; k < end; ++k) body(static_cast<std::size_t>(k));
+    });
+  }
   double relative(double time) const { return 2 * (time - begin_) / (end_ - begin_) - 1; }
   int spline_count() const { return splines_.size(); }
 
@@ -110,13 +128,14 @@ class SweepFit {
     return way;
   }
   double residual(const Crossing& s) const {
-    const double r = relative(s.time);
-    return s.point.x() + (unknowns_[0] + r * unknowns_[1]) * s.point.y() +
-           (unknowns_[2] + r * unknowns_[3]) * s.point.z() - way_at(s.time);
+    double way = 0;
+    for (int k = 0; k < 4; ++k) way += s.spline[static_cast<std::size_t>(k)] * unknowns_[4 + s.first + k];
+    return s.point.x() + (unknowns_[0] + s.relative * unknowns_[1]) * s.point.y() +
+           (unknowns_[2] + s.relative * unknowns_[3]) * s.point.z() - way;
   }
   double median_residual() const {
-    std::vector<double> misses;
-    for (const Crossing& s : crossings_) misses.push_back(std::abs(residual(s)));
+    std::vector<double> misses(crossings_.size());
+    for_each_crossing([&](std::size_t k) { misses[k] = std::abs(residual(crossings_[k])); });
     const auto middle = misses.begin() + static_cast<std::ptrdiff_t>(misses.size() / 2);
     std::nth_element(misses.begin(), middle, misses.end());
     return *middle;
@@ -144,14 +163,13 @@ void SweepFit::solve(const std::vector<double>& robust) {
   Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
   for (std::size_t k = 0; k < crossings_.size(); ++k) {
     const Crossing& s = crossings_[k];
-    const double weight = robust[k] * s.weight, r = relative(s.time);
+    const double weight = robust[k] * s.weight, r = s.relative;
     if (weight == 0) continue;
-    const BSplineRow row = splines_.at(s.time);
     std::array<double, 8> value{-s.point.y(), -r * s.point.y(), -s.point.z(), -r * s.point.z()};
     std::array<int, 8> place{0, 1, 2, 3};
     for (std::size_t j = 0; j < 4; ++j) {
-      value[4 + j] = row.value[j];
-      place[4 + j] = 4 + row.first + static_cast<int>(j);
+      value[4 + j] = s.spline[j];
+      place[4 + j] = 4 + s.first + static_cast<int>(j);
     }
     for (std::size_t i = 0; i < 8; ++i) {
       right[place[i]] += weight * value[i] * s.point.x();
@@ -189,7 +207,8 @@ void LightCalibration::add(const PointMap& points, const TimeMap& times, const P
 std::optional<LightSweep> LightCalibration::fit() {
   fitted_ = sightings_.size();
   std::vector<Crossing> crossings;
-  for (const Sighting& s : sightings_) crossings.push_back({s.point.cast<double>(), s.time, s.weight});
+  for (const Sighting& s : sightings_)
+    crossings.push_back({.point = s.point.cast<double>(), .time = s.time, .weight = s.weight});
   if (crossings.size() < 1000) return std::nullopt;
   const auto [begin, end] = std::ranges::minmax(crossings, {}, &Crossing::time);
   if (!(end.time - begin.time >= 10)) return std::nullopt;
