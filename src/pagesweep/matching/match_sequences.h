@@ -11,7 +11,7 @@ namespace pagesweep {
 /// camera's sequences. A frame that either camera dropped is left out; a clipped sample counts as the saturation value,
 /// so that clipped agrees with clipped. Both directions must agree.
 ///
-/// Memory: two bytes for each sample of both cameras, their number rounded up to a multiple of 32.
+/// Memory: two bytes for each sample of both cameras, and some 20 a pixel.
 /// \throws std::invalid_argument  if frames and camera differ in size, or near_mm, far_mm contradict each other
 /// \throws Error  no_result if the cameras share fewer than 3 frames
 MatchPair match_sequences(const Frames& first, const Frames& second, const RayTable& first_camera,
