@@ -3,6 +3,7 @@
 #include "cli/capture_input.h"
 #include "cli/command.h"
 #include "cli/console_progress.h"
+#include "cli/memory.h"
 #include "cli/option_visitor.h"
 #include "cli/output_folder.h"
 #include "cli/result_output.h"
@@ -34,6 +35,7 @@ void run(const Arguments& arguments) {
   progress.begin("reading the points");
   Measurement measurement = read_measurement(arguments.result, rig);
   const Picture picture = read_picture(picture_file);
+  const UnusedMemoryKept kept;
   const Scan scan = flatten(std::move(measurement), picture, rig, arguments.options, progress);
 
   progress.begin("writing the pages");

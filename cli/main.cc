@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
-#include <malloc.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -11,6 +10,7 @@
 #include "cli/exit_code.h"
 #include "cli/help_formatter.h"
 #include "cli/interrupt.h"
+#include "cli/memory.h"
 
 namespace pagesweep::cli {
 namespace {
@@ -94,9 +94,7 @@ int run(CLI::App& app, int argc, char** argv) {
 }  // namespace pagesweep::cli
 
 int main(int argc, char** argv) {
-  // Pictures and maps go back to the system as soon as they are not needed: by itself glibc would come to keep those of
-  // 4 MB among small things, where a hole of 100 MB or more stays.
-  mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  pagesweep::cli::return_unused_memory();
   pagesweep::cli::catch_interrupts();
   CLI::App app(pagesweep::cli::description, "pagesweep");
   pagesweep::cli::add_commands(app);

@@ -5,6 +5,7 @@
 #include "cli/capture_input.h"
 #include "cli/command.h"
 #include "cli/console_progress.h"
+#include "cli/memory.h"
 #include "cli/option_visitor.h"
 #include "cli/output_folder.h"
 #include "cli/result_output.h"
@@ -46,7 +47,11 @@ void run(const Arguments& arguments) {
     if (!picture) picture = read_picture(picture_file);
     return *picture;
   };
-  const Scan scan = scan_page(*opened.frames, ScanSource(read), opened.rig, arguments.options, progress);
+  const Scan scan = [&] {
+    Measurement measurement = reconstruct(*opened.frames, opened.rig, arguments.options, progress, ScanSource(read));
+    const UnusedMemoryKept kept;
+    return flatten(std::move(measurement), read(), opened.rig, arguments.options, progress);
+  }();
 
   write_scan(output,
              {.title = title_of(opened.capture),

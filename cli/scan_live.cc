@@ -11,6 +11,7 @@
 #include "cli/console_progress.h"
 #include "cli/live_recording.h"
 #include "cli/live_view.h"
+#include "cli/memory.h"
 #include "cli/output_folder.h"
 #include "pagesweep/base/error.h"
 #include "pagesweep/base/parallel.h"
@@ -99,6 +100,7 @@ Measurement measure(WatchedSource& source, LatePicture& late_picture, const Rig&
 std::exception_ptr flatten(Scan& scan, const Picture& picture, const Rig& rig, const ScanOptions& options,
                            Progress& progress) {
   try {
+    const UnusedMemoryKept kept;
     scan = pagesweep::flatten(std::move(scan.measurement), picture, rig, options, progress);
     return nullptr;
   } catch (const Error&) {

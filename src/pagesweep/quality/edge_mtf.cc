@@ -131,7 +131,7 @@ void add_page_row(const Image<float>& light, const PrintedEdge& edge, const Edge
 }
 
 /// The scan's own pixels around the same place, by their distance from the edge on the page.
-void add_scan_row(const Image<float>& scan, const ScanMap& map, bool upright, const PrintedEdge& edge,
+void add_scan_row(const PictureLight& scan, const ScanMap& map, bool upright, const PrintedEdge& edge,
                   const EdgeRow& row, int y, EdgeSpread& spread) {
   const auto look_up = [&](int along, int across) {
     const int px = upright ? along : across, py = upright ? across : along;
@@ -152,10 +152,10 @@ void add_scan_row(const Image<float>& scan, const ScanMap& map, bool upright, co
   std::vector<std::pair<double, double>> pixels;
   for (int k = -7; k <= 7; ++k) {
     const int u = u0 + (along_u ? k : 0), v = v0 + (along_u ? 0 : k);
-    if (!scan.contains(u, v)) return;
+    if (u < 0 || v < 0 || u >= scan.width() || v >= scan.height()) return;
     const Eigen::Vector2d page = page_by_scan * (Eigen::Vector2d(u, v) - here);
     const double distance = x + page.x() - row.place - edge.slope * page.y();
-    pixels.emplace_back(towards_paper * distance * row.cosine, scan(u, v));
+    pixels.emplace_back(towards_paper * distance * row.cosine, scan.at(u, v));
   }
   double ink = 0, paper = 0, inks = 0, papers = 0;
   for (const auto& [distance, value] : pixels) {
@@ -175,7 +175,7 @@ Image<float> transposed(const Image<float>& image) {
   return turned;
 }
 
-EdgeSharpness sharpness_along(const Image<float>& light, const ScanMap& map, bool upright, const Image<float>& scan) {
+EdgeSharpness sharpness_along(const Image<float>& light, const ScanMap& map, bool upright, const PictureLight& scan) {
   std::vector<PrintedEdge> edges = find_printed_edges(light);
   EdgeSharpness sharpness;
   if (edges.size() < least_edges) return sharpness;
@@ -278,9 +278,9 @@ std::vector<PrintedEdge> find_printed_edges(const Image<float>& light, int least
 }
 
 std::array<EdgeSharpness, 2> measure_sharpness(const Page& page, const Image<float>& page_light,
-                                               const Image<float>& scan_light) {
-  return {sharpness_along(page_light, page.scan_map, true, scan_light),
-          sharpness_along(transposed(page_light), page.scan_map, false, scan_light)};
+                                               const PictureLight& scan) {
+  return {sharpness_along(page_light, page.scan_map, true, scan),
+          sharpness_along(transposed(page_light), page.scan_map, false, scan)};
 }
 
 }  // namespace pagesweep

@@ -8,6 +8,7 @@
 #include "pagesweep/base/image.h"
 #include "pagesweep/data/page.h"
 #include "pagesweep/data/picture.h"
+#include "pagesweep/quality/paper_look.h"
 
 namespace pagesweep {
 
@@ -43,10 +44,9 @@ std::vector<PrintedEdge> find_printed_edges(const Image<float>& light, int least
 /// from their own edge in quarters of a pixel, give the edge spread function; its derivative, in a window of 3 px to
 /// either side, the line spread function; and the size of its Fourier transform is the result. The page's rows, turned
 /// by its own sampling, replace the slant of a target: edges lie at all phases of the pixel grid.
-/// \param scan_light   the scan in light: see linear_light()
 /// \return             along x (from upright edges) and along y (from level ones)
 std::array<EdgeSharpness, 2> measure_sharpness(const Page& page, const Image<float>& page_light,
-                                               const Image<float>& scan_light);
+                                               const PictureLight& scan);
 
 /// The transfer function of an edge spread function sampled every 1 / oversampling px, its middle in the middle.
 Mtf transfer_of(const std::vector<double>& edge_spread, int oversampling);

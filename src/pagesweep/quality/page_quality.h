@@ -79,7 +79,7 @@ struct PageQuality {
 };
 
 /// \param kernel  that the page was resampled with
-PageQuality measure_quality(const Page& page, const PageSurface& surface, const Image<float>& scan_light,
+PageQuality measure_quality(const Page& page, const PageSurface& surface, const PictureLight& scan,
                             ResampleKernel kernel, const QualityOptions& options = {});
 
 /// All pages of a scan.

@@ -96,7 +96,7 @@ PageSurface level_surface(const Page& page, double stretch = 1) {
 }
 
 PageQuality quality_of(const Page& page, double stretch = 1) {
-  return measure_quality(page, level_surface(page, stretch), light_of_page(page), ResampleKernel::lanczos3);
+  return measure_quality(page, level_surface(page, stretch), PictureLight(page.picture), ResampleKernel::lanczos3);
 }
 
 TEST(PageQuality, AGoodPageIsGood) {

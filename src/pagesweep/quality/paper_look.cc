@@ -104,28 +104,16 @@ void count_clipped(const Page& page, PaperLook& look) {
 
 }  // namespace
 
-Image<float> light_of_picture(const Picture& picture) {
-  const std::vector<float> table = TransferCurve::of(picture).table(picture.bit_depth());
-  Image<float> light(picture.width(), picture.height());
-  std::visit(
-      [&](const auto& samples) {
-        parallel_rows(picture.height(), [&](int y) {
-          for (int x = 0; x < picture.width(); ++x) {
-            const auto* pixel = &samples(x * picture.channels, y);
-            light(x, y) = picture.channels == 3
-                              ? 0.2126f * table[pixel[0]] + 0.7152f * table[pixel[1]] + 0.0722f * table[pixel[2]]
-                              : table[pixel[0]];
-          }
-        });
-      },
-      picture.samples);
-  return light;
-}
+PictureLight::PictureLight(const Picture& picture)
+    : picture_(&picture), lights_(TransferCurve::of(picture).table(picture.bit_depth())) {}
 
 Image<float> light_of_page(const Page& page) {
-  Image<float> light = light_of_picture(page.picture);
-  for (std::size_t k = 0; k < light.size(); ++k)
-    if (std::isnan(page.scan_map.u.data()[k])) light.data()[k] = not_a_number;
+  const PictureLight picture(page.picture);
+  Image<float> light(picture.width(), picture.height());
+  parallel_rows(light.height(), [&](int y) {
+    for (int x = 0; x < light.width(); ++x)
+      light(x, y) = std::isnan(page.scan_map.u(x, y)) ? not_a_number : picture.at(x, y);
+  });
   return light;
 }
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <variant>
+#include <vector>
+
 #include "pagesweep/base/image.h"
 #include "pagesweep/data/page.h"
 
@@ -20,10 +23,30 @@ struct PaperLook {
 /// \param light  of the page, 0 to 1, NaN where it shows nothing (see light_of_page())
 PaperLook look_at_paper(const Page& page, const Image<float>& light);
 
-/// Luminance of each pixel, 0 to 1: samples through the picture's tone curve, weighted 0.2126, 0.7152, 0.0722. NaN
-/// where the scan map says that the scan shows nothing.
+/// Luminance of a picture's pixels, 0 to 1: samples through its tone curve, weighted 0.2126, 0.7152, 0.0722.
+class PictureLight {
+ public:
+  explicit PictureLight(const Picture& picture);  ///< must outlive this
+  int width() const { return picture_->width(); }
+  int height() const { return picture_->height(); }
+  float at(int x, int y) const {
+    return std::visit([&](const auto& samples) { return light_of(&samples(x * picture_->channels, y)); },
+                      picture_->samples);
+  }
+
+ private:
+  template <class T>
+  float light_of(const T* pixel) const {
+    return picture_->channels == 3
+               ? 0.2126f * lights_[pixel[0]] + 0.7152f * lights_[pixel[1]] + 0.0722f * lights_[pixel[2]]
+               : lights_[pixel[0]];
+  }
+
+  const Picture* picture_;
+  std::vector<float> lights_;  ///< of every sample
+};
+
+/// That of each pixel of a page; NaN where the scan map says that the scan shows nothing.
 Image<float> light_of_page(const Page& page);
-/// Likewise of a whole picture.
-Image<float> light_of_picture(const Picture& picture);
 
 }  // namespace pagesweep
