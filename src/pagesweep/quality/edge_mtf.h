@@ -7,7 +7,6 @@
 
 #include "pagesweep/base/image.h"
 #include "pagesweep/data/page.h"
-#include "pagesweep/data/picture.h"
 #include "pagesweep/quality/paper_look.h"
 
 namespace pagesweep {
