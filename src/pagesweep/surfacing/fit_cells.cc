@@ -9,7 +9,7 @@
 namespace pagesweep {
 namespace {
 
-constexpr int fit_pitch = 4;  // [cells]
+constexpr int fit_pitch = 3;  // [cells]
 constexpr double agreement_sigmas = 2;
 
 /// A lattice fit near a cell, seen from that cell.

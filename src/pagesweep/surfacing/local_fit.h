@@ -73,7 +73,7 @@ Image<LocalFit> fit_lattice(const CellColumns& cells, double cell_mm, int pitch,
 Image<LocalFit> refine_lattice(const Image<LocalFit>& coarse, const Image<CellMean>& cells, double cell_mm, int pitch,
                                const LocalFitOptions& options);
 
-/// A fit at each cell. Most come from a lattice of every fourth cell of either axis, much finer than a neighbourhood:
+/// A fit at each cell. Most come from a lattice of every third cell of either axis, much finer than a neighbourhood:
 /// where all is smooth, the surrounding fits are blended; other cells are fitted one by one. At an edge that takes ten
 /// windows; if one may `borrow`, a cell takes the one of the surrounding fits that its own points agree with best.
 /// \param wanted  which cells; others remain without
