@@ -7,23 +7,9 @@
 
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/camera/undistort_internal.h"
+#include "pagesweep/camera/valid_radius.h"
 
 namespace pagesweep {
-namespace {
-
-/// Largest r^2, up to that of 76 degrees off the axis, to which the distortion is valid.
-double largest_valid_radius_squared(const BrownConrady& lens) {
-  double valid = 0, beyond = 16;
-  if (lens.is_valid_at(beyond)) return beyond;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (valid + beyond);
-    (lens.is_valid_at(middle) ? valid : beyond) = middle;
-  }
-  return valid;
-}
-
-}  // namespace
-
 RayTable::RayTable(const Camera& camera) : camera_(camera), directions_(camera.width, camera.height) {
   const double valid = largest_valid_radius_squared(camera.distortion);
   parallel_rows(camera.height, [&](int y) {

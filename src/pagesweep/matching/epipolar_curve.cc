@@ -5,22 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include "pagesweep/camera/valid_radius.h"
 
 namespace pagesweep {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-/// Largest r^2, up to that of 76 degrees off the axis, to which the distortion is valid.
-double largest_valid_radius_squared(const BrownConrady& lens) {
-  double valid = 0, beyond = 16;
-  if (lens.is_valid_at(beyond)) return beyond;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (valid + beyond);
-    (lens.is_valid_at(middle) ? valid : beyond) = middle;
-  }
-  return valid;
-}
 
 /// Narrows `range` to where c0 + w c1 >= 0.
 void keep_where_positive(double c0, double c1, InverseDepthRange& range) {

@@ -184,6 +184,35 @@ Shifted shift(const BellTable& table, std::size_t at, Vector slope, Vector x) {
   return {hn::MulAdd(x, half_way, hn::LoadU(d, &table.value[at])), hn::MulAdd(x, bend, slope)};
 }
 
+/// Some samples of a bell: their weights, what the model leaves of them, and the model's derivatives.
+struct Samples {
+  Vector weight, residual, profile, slope;
+  Vector stretch;  ///< with respect to the width, if that is unknown, too
+};
+
+template <std::size_t count>
+HWY_INLINE void add(const Samples& s, Vector (&part)[count]) {
+  const Vector by_profile = hn::Mul(s.weight, s.profile), by_slope = hn::Mul(s.weight, s.slope);
+  const Vector by_residual = hn::Mul(s.weight, s.residual);
+  part[0] = hn::MulAdd(by_profile, s.profile, part[0]);
+  part[1] = hn::Add(part[1], by_profile);
+  part[2] = hn::Add(part[2], s.weight);
+  part[3] = hn::MulAdd(by_profile, s.slope, part[3]);
+  part[4] = hn::Add(part[4], by_slope);
+  part[5] = hn::MulAdd(by_slope, s.slope, part[5]);
+  part[6] = hn::MulAdd(by_residual, s.profile, part[6]);
+  part[7] = hn::Add(part[7], by_residual);
+  part[8] = hn::MulAdd(by_residual, s.slope, part[8]);
+  part[9] = hn::MulAdd(by_residual, s.residual, part[9]);
+  if constexpr (count == 15) {
+    part[10] = hn::MulAdd(by_profile, s.stretch, part[10]);
+    part[11] = hn::MulAdd(s.weight, s.stretch, part[11]);
+    part[12] = hn::MulAdd(by_slope, s.stretch, part[12]);
+    part[13] = hn::MulAdd(hn::Mul(s.weight, s.stretch), s.stretch, part[13]);
+    part[14] = hn::MulAdd(by_residual, s.stretch, part[14]);
+  }
+}
+
 /// \tparam is_even    no sample was exposed later than its frame
 /// \tparam has_width  whether the width is unknown, too
 template <bool is_even, bool has_width>
@@ -223,27 +252,7 @@ void weigh(const BellBatch& batch, Equations& equations) {
       const Vector variance = hn::MulAdd(gain, hn::Max(model, hn::Zero(d)), read);
       const Vector use = hn::Mul(hn::LoadU(d, present + k), hn::LoadU(d, inside + k));
       const Vector weight = hn::Div(use, variance);
-      const Vector residual = hn::Sub(gray, model);
-      const Vector by_profile = hn::Mul(weight, profile), by_slope = hn::Mul(weight, slope);
-      const Vector by_residual = hn::Mul(weight, residual);
-      part[0] = hn::MulAdd(by_profile, profile, part[0]);
-      part[1] = hn::Add(part[1], by_profile);
-      part[2] = hn::Add(part[2], weight);
-      part[3] = hn::MulAdd(by_profile, slope, part[3]);
-      part[4] = hn::Add(part[4], by_slope);
-      part[5] = hn::MulAdd(by_slope, slope, part[5]);
-      part[6] = hn::MulAdd(by_residual, profile, part[6]);
-      part[7] = hn::Add(part[7], by_residual);
-      part[8] = hn::MulAdd(by_residual, slope, part[8]);
-      part[9] = hn::MulAdd(by_residual, residual, part[9]);
-      if constexpr (has_width) {
-        const Vector stretch = hn::Mul(slope, hn::Sub(after, late));
-        part[10] = hn::MulAdd(by_profile, stretch, part[10]);
-        part[11] = hn::MulAdd(weight, stretch, part[11]);
-        part[12] = hn::MulAdd(by_slope, stretch, part[12]);
-        part[13] = hn::MulAdd(hn::Mul(weight, stretch), stretch, part[13]);
-        part[14] = hn::MulAdd(by_residual, stretch, part[14]);
-      }
+      add({weight, hn::Sub(gray, model), profile, slope, hn::Mul(slope, hn::Sub(after, late))}, part);
       after = hn::Add(after, hn::Set(d, static_cast<float>(lanes)));
     }
     sums.put(i, part);
