@@ -62,6 +62,7 @@ void measure_time_values(const Settings& settings, Report& report);
 void measure_points(const Settings& settings, Report& report);
 void measure_streaming(const Settings& settings, Report& report);
 void measure_growth(const Settings& settings, Report& report);
+void measure_plain_code(const Settings& settings, Report& report);
 void measure_gray_code(const Settings& settings, Report& report);
 void measure_reading(const Settings& settings, Report& report);
 

@@ -21,7 +21,8 @@ struct Group {
 constexpr Group groups[] = {
     {"time-values", pagesweep::bench::measure_time_values}, {"streaming", pagesweep::bench::measure_streaming},
     {"points", pagesweep::bench::measure_points},           {"growth", pagesweep::bench::measure_growth},
-    {"gray-code", pagesweep::bench::measure_gray_code},     {"reading", pagesweep::bench::measure_reading}};
+    {"scalar", pagesweep::bench::measure_plain_code},       {"gray-code", pagesweep::bench::measure_gray_code},
+    {"reading", pagesweep::bench::measure_reading}};
 
 }  // namespace
 
@@ -30,7 +31,8 @@ int main(int argc, char** argv) try {
   Settings settings;
   std::vector<std::string> only;
   std::filesystem::path json;
-  app.add_option("--only", only, "groups to run: time-values, streaming, points, growth, gray-code, reading [all]");
+  app.add_option("--only", only,
+                 "groups to run: time-values, streaming, points, growth, scalar, gray-code, reading [all]");
   app.add_option("--rounds", settings.rounds, "how often each way runs [5]")->check(CLI::PositiveNumber);
   app.add_option("--gray-code", settings.gray_code_capture,
                  "capture of a projected Gray code: of the columns, each pattern followed by its inverse, then white "
