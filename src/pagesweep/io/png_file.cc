@@ -13,6 +13,7 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/io/atomic_file.h"
+#include "pagesweep/io/png_unpacking_internal.h"
 
 namespace pagesweep {
 namespace {
@@ -133,8 +134,11 @@ void require_gray(const PngReader& reader, const std::filesystem::path& file, st
 
 template <class T>
 Image<T> read_pixels(PngReader& reader, const PngSession& session, const std::filesystem::path& file) {
-  Image<T> image(static_cast<int>(png_get_image_width(reader.png(), reader.info())),
-                 static_cast<int>(png_get_image_height(reader.png(), reader.info())));
+  const auto width = static_cast<int>(png_get_image_width(reader.png(), reader.info()));
+  const auto height = static_cast<int>(png_get_image_height(reader.png(), reader.info()));
+  if (png_get_interlace_type(reader.png(), reader.info()) == PNG_INTERLACE_NONE)
+    if (auto unpacked = unpack_gray_png<T>(session.input, width, height)) return *std::move(unpacked);
+  Image<T> image(width, height);
   std::vector<png_bytep> rows;
   for (int y = 0; y < image.height(); ++y) rows.push_back(reinterpret_cast<png_bytep>(image.row(y).data()));
   const bool done = attempt(reader.png(), [&] {
