@@ -2,6 +2,7 @@
 #include "pagesweep/pipeline/results.h"
 
 #include "pagesweep/base/error.h"
+#include "pagesweep/base/parallel.h"
 #include "pagesweep/io/color_profile.h"
 #include "pagesweep/io/float_tiff.h"
 #include "pagesweep/io/image_codecs.h"
@@ -48,6 +49,22 @@ Picture finished(const Page& page, const PageFileOptions& options, const PageOri
   return picture;
 }
 
+void write_maps(const PageFiles& files, const Page& page, const PageSurface& surface) {
+  write_scan_map(files.scan_map, page.scan_map);
+  write_surface(files.surface, surface);
+  if (surface.strain.size() > 0) write_float_tiff(files.strain, {surface.strain.view(), surface.strain_sigma.view()});
+}
+
+void write_camera(const fs::path& folder, const Measurement& measurement, std::size_t camera) {
+  const CameraFiles files(folder, measurement.cameras[camera].name);
+  write_point_map(files, measurement.points[camera]);
+  if (measurement.timing)
+    write_time_map(files, measurement.timing->maps[camera]);
+  else
+    fs::remove(files.times);  // of an earlier run
+  if (!measurement.clipped_frames.empty()) write_gray_png(files.clipped, measurement.clipped_frames[camera].view());
+}
+
 void remove_old_pages(const fs::path& folder) {
   if (!fs::is_directory(folder)) return;
   for (const int index : pages_in(folder)) {
@@ -65,16 +82,13 @@ void remove_old_pages(const fs::path& folder) {
 void check(const PageFileOptions& options) { names_of_pages({1, 2}, options, {}); }
 
 void write_measurement(const fs::path& folder, const Measurement& measurement) {
-  write_ply(folder / "points.ply", measurement.points);
-  for (std::size_t c = 0; c < measurement.points.size(); ++c) {
-    const CameraFiles files(folder, measurement.cameras[c].name);
-    write_point_map(files, measurement.points[c]);
-    if (measurement.timing)
-      write_time_map(files, measurement.timing->maps[c]);
+  const auto cameras = static_cast<int>(measurement.points.size());
+  parallel_rows(cameras + 1, [&](int c) {
+    if (c == cameras)
+      write_ply(folder / "points.ply", measurement.points);
     else
-      fs::remove(files.times);  // of an earlier run
-    if (!measurement.clipped_frames.empty()) write_gray_png(files.clipped, measurement.clipped_frames[c].view());
-  }
+      write_camera(folder, measurement, static_cast<std::size_t>(c));
+  });
 }
 
 Measurement read_measurement(const fs::path& folder, const Rig& rig) {
@@ -98,16 +112,14 @@ void write_pages(const fs::path& folder, std::span<const Page> pages, std::span<
   const std::vector<std::string> names = names_of_pages(indices, options, origin);
   remove_old_pages(folder);
   PagesFile index{origin.capture, {}};
-  for (std::size_t i = 0; i < pages.size(); ++i) {
-    const PageFiles files(folder, pages[i].index);
-    write_scan_map(files.scan_map, pages[i].scan_map);
-    write_surface(files.surface, surfaces[i]);
-    if (surfaces[i].strain.size() > 0)
-      write_float_tiff(files.strain, {surfaces[i].strain.view(), surfaces[i].strain_sigma.view()});
-    const std::string name = names[i] + "." + std::string(extension_of(options.format));
-    write_picture(folder / name, finished(pages[i], options, origin), options.picture);
-    index.pages.push_back({pages[i].index, name, side_of(pages[i].index, static_cast<int>(pages.size()))});
-  }
+  for (std::size_t i = 0; i < pages.size(); ++i)
+    index.pages.push_back({pages[i].index, names[i] + "." + std::string(extension_of(options.format)),
+                           side_of(pages[i].index, static_cast<int>(pages.size()))});
+  parallel_rows(static_cast<int>(pages.size()), [&](int n) {
+    const auto i = static_cast<std::size_t>(n);
+    write_maps(PageFiles(folder, pages[i].index), pages[i], surfaces[i]);
+    write_picture(folder / index.pages[i].picture, finished(pages[i], options, origin), options.picture);
+  });
   write_pages_file(folder, index);
 }
 
