@@ -14,6 +14,7 @@
 
 #include "pagesweep/base/error.h"
 #include "pagesweep/matching/sequence_fit.h"
+#include "pagesweep/matching/sequence_landings.h"
 #include "pagesweep/matching/sequence_search_internal.h"
 #include "pagesweep/matching/sequence_store.h"
 #include "pagesweep/matching/two_way.h"
@@ -41,6 +42,8 @@ struct Seeker {
   SequenceFit best;
   bool has_best = false;
   int place_of_best = 0;
+  Eigen::Vector2d rival_px{0, 0};  ///< if that makes it ambiguous
+  bool has_rival = false;
   std::optional<Match> verdict;
 
   /// Whether there is a place that may lead. \param slack  of the energy, that its distance may be too large
@@ -52,8 +55,7 @@ struct Seeker {
     return {curve.first_score() + first, static_cast<std::size_t>(last - first + 1)};
   }
   /// [1/mm] What is even in the picture is not in depth: a mixture of homogeneous points weighs them by their z.
-  double inverse_depth(float place) const {
-    const double share = curve.share_at(place);
+  double inverse_depth_at(double share) const {
     const double weight_near = share * z_far, weight_far = (1 - share) * z_near;
     return (weight_near * near + weight_far * far) / (weight_near + weight_far);
   }
@@ -92,6 +94,11 @@ class SequenceFinder final : public MatchFinder {
               range.far,
               range.near};
   }
+  /// What find_block() may begin with, and what it leaves behind; null: nothing.
+  void use(const SequenceLandings* known, SequenceLandings* new_ones) {
+    known_ = known;
+    new_ones_ = new_ones;
+  }
   /// Matches the pixels of a rectangle, at most pixels_at_once of them.
   void find_block(int left, int top, int right, int bottom, const EpipolarGeometry& geometry, Correspondences& matches);
 
@@ -105,6 +112,9 @@ class SequenceFinder final : public MatchFinder {
   }
   void find_all(std::size_t count);
   void lay(std::span<Seeker> seekers);
+  void begin(Seeker& seeker);
+  void return_home(std::span<Seeker> seekers);
+  bool is_home(const SequenceFit& fit, Seeker& seeker) const;
   void seek(Seeker& seeker);
   void improve(const Seeker& seeker, std::span<CurveMinimum> minima) const {
     improve_minima(to_, seeker.curve, seeker.own.square, affine_, minima);
@@ -112,6 +122,7 @@ class SequenceFinder final : public MatchFinder {
   void improve_others(Seeker& seeker) const;
   void decide(std::span<Seeker> seekers);
   void ask(Seeker& seeker);
+  void ask_at(double inverse_depth, Seeker& seeker);
   void hear(const SequenceFit& fit, Seeker& seeker) const;
   void judge(Seeker& seeker) const;
   void judge_sigmas(std::span<Seeker> seekers);
@@ -119,11 +130,14 @@ class SequenceFinder final : public MatchFinder {
     return seeker.has_best && seeker.best.distance_squared <= options_.max_dissimilarity * seeker.energy;
   }
   bool is_rival(const SequenceFit& other, int place_of_other, const Seeker& seeker) const;
+  void leave_landing(const Seeker& seeker) const;
 
   const SequenceStore& from_;
   const SequenceArrays& to_;
   const MatchOptions& options_;
   bool affine_;
+  const SequenceLandings* known_ = nullptr;
+  SequenceLandings* new_ones_ = nullptr;
   SequenceFitter fitter_;
   CurveFrame frame_{};
   LineBatch lines_;
@@ -135,7 +149,10 @@ class SequenceFinder final : public MatchFinder {
 void SequenceFinder::find_all(std::size_t count) {
   const auto seekers = std::span(seekers_).first(count);
   lay(seekers);
-  for (Seeker& seeker : seekers) seek(seeker);
+  for (Seeker& seeker : seekers) begin(seeker);
+  if (known_) return_home(seekers);
+  for (Seeker& seeker : seekers)
+    if (!seeker.verdict) seek(seeker);
   decide(seekers);
   judge_sigmas(seekers);
 }
@@ -157,10 +174,9 @@ void SequenceFinder::lay(std::span<Seeker> seekers) {
   }
 }
 
-/// Compares with the pixels nearest to the curve, and notes the most promising places.
-void SequenceFinder::seek(Seeker& seeker) {
+void SequenceFinder::begin(Seeker& seeker) {
   seeker.next = 0;
-  seeker.has_best = false;
+  seeker.has_best = seeker.has_rival = false;
   seeker.verdict.reset();
   seeker.unseen = seeker.promising = {};
   if (!(seeker.line.count > 0)) {
@@ -170,6 +186,40 @@ void SequenceFinder::seek(Seeker& seeker) {
   seeker.energy = from_.energy(seeker.index);
   from_.copy(seeker.index, seeker.pairs);
   seeker.own.square = from_.square(seeker.index);
+}
+
+/// Where a pixel of the other camera found its match at a seeker, and no other one did: whether it is its match, too.
+void SequenceFinder::return_home(std::span<Seeker> seekers) {
+  asked_.clear();
+  for (Seeker& seeker : seekers) {
+    if (seeker.verdict || !(seeker.line.straight > 0)) continue;
+    if (const auto home = known_->origin(seeker.index)) {
+      const float share = (*home - seeker.line.from) / (seeker.line.to - seeker.line.from);
+      if (share >= 0 && share <= 1) ask_at(seeker.inverse_depth_at(share), seeker);
+    }
+  }
+  while (!asked_.empty()) {
+    const std::size_t moving = fitter_.fit(frame_, asked_);
+    heard_.assign(asked_.begin() + static_cast<std::ptrdiff_t>(moving), asked_.end());
+    asked_.resize(moving);
+    for (const SequenceFit* fit : heard_) {
+      Seeker& seeker = seekers[static_cast<std::size_t>(fit - fits_.data())];
+      if (!is_home(*fit, seeker)) continue;
+      seeker.best = *fit;
+      seeker.has_best = true;
+      judge(seeker);
+    }
+  }
+}
+
+bool SequenceFinder::is_home(const SequenceFit& fit, Seeker& seeker) const {
+  constexpr int most_attempts = 3;
+  return fit.found && fit.attempts <= most_attempts && fit.least_sigma_px <= options_.max_sigma_px &&
+         fit.distance_squared <= options_.max_dissimilarity * seeker.energy;
+}
+
+/// Compares with the pixels nearest to the curve, and notes the most promising places.
+void SequenceFinder::seek(Seeker& seeker) {
   score_curve(to_, frame_.lens, seeker.line, seeker.own, seeker.curve);
   if (seeker.minima.size() <= static_cast<std::size_t>(seeker.curve.count))
     seeker.minima.resize(static_cast<std::size_t>(seeker.curve.count) + 1);
@@ -233,11 +283,15 @@ void SequenceFinder::ask(Seeker& seeker) {
     judge(seeker);
     return;
   }
+  ask_at(seeker.inverse_depth_at(seeker.curve.share_at(seeker.promising[seeker.next++].place)), seeker);
+}
+
+void SequenceFinder::ask_at(double inverse_depth, Seeker& seeker) {
   SequenceFit& fit = fits_[static_cast<std::size_t>(&seeker - seekers_.data())];
   fit.index = seeker.index;
   fit.own = seeker.own;
   fit.direction = &seeker.direction;
-  fit.inverse_depth = seeker.inverse_depth(seeker.promising[seeker.next++].place);
+  fit.inverse_depth = inverse_depth;
   fit.attempts = 0;
   asked_.push_back(&fit);
 }
@@ -246,6 +300,10 @@ void SequenceFinder::ask(Seeker& seeker) {
 void SequenceFinder::hear(const SequenceFit& fit, Seeker& seeker) const {
   const int place = static_cast<int>(seeker.promising[seeker.next - 1].place + 0.5f);
   const bool has_rival = seeker.has_best && is_rival(fit, place, seeker);
+  if (has_rival) {
+    seeker.rival_px = fit.distance_squared < seeker.best.distance_squared ? seeker.best.pixel : fit.pixel;
+    seeker.has_rival = true;
+  }
   if (!seeker.has_best || fit.distance_squared < seeker.best.distance_squared) {
     seeker.best = fit;
     seeker.has_best = true;
@@ -313,13 +371,28 @@ void SequenceFinder::find_block(int left, int top, int right, int bottom, const 
       pixels[count++] = {x, y};
     }
   find_all(count);
-  for (std::size_t k = 0; k < count; ++k) put(*seekers_[k].verdict, pixels[k].first, pixels[k].second, matches);
+  for (std::size_t k = 0; k < count; ++k) {
+    put(*seekers_[k].verdict, pixels[k].first, pixels[k].second, matches);
+    if (new_ones_) leave_landing(seekers_[k]);
+  }
+}
+
+/// A match, for the way back; or places that might have been one.
+void SequenceFinder::leave_landing(const Seeker& seeker) const {
+  if (!seeker.has_best) return;
+  if (seeker.verdict->status == PixelStatus::ok)
+    new_ones_->land(seeker.index, seeker.best.pixel.x(), seeker.best.pixel.y());
+  else
+    new_ones_->contest(seeker.best.pixel.x(), seeker.best.pixel.y());
+  if (seeker.has_rival) new_ones_->contest(seeker.rival_px.x(), seeker.rival_px.y());
 }
 
 class SequenceMatcher final : public PixelMatcher {
  public:
-  SequenceMatcher(const SequenceStore& from, const SequenceStore& to, const MatchOptions& options)
-      : from_(from), to_(to), options_(options) {}
+  /// \param known, new_ones  see SequenceFinder::use()
+  SequenceMatcher(const SequenceStore& from, const SequenceStore& to, const MatchOptions& options,
+                  const SequenceLandings* known, SequenceLandings* new_ones)
+      : from_(from), to_(to), options_(options), known_(known), new_ones_(new_ones) {}
 
   PixelStatus status_of(int x, int y) const override { return from_.status(from_.index(x, y)); }
   std::unique_ptr<MatchFinder> make_finder() const override {
@@ -329,6 +402,7 @@ class SequenceMatcher final : public PixelMatcher {
   void match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const override {
     SequenceFinder finder(from_, to_, options_);
     finder.look_into(geometry.view(), geometry.origin(), geometry.range());
+    finder.use(known_, new_ones_);
     constexpr int all = static_cast<int>(pixels_at_once);
     const int rows = from_.arrays().along_rows ? 1 : std::min(all, bottom - top), columns = all / rows;
     for (int y = top; y < bottom; y += rows)
@@ -340,6 +414,8 @@ class SequenceMatcher final : public PixelMatcher {
   const SequenceStore& from_;
   const SequenceStore& to_;
   const MatchOptions& options_;
+  const SequenceLandings* known_;
+  SequenceLandings* new_ones_;
 };
 
 /// Whether one camera's epipolar curves run along the rows of another's picture rather than its columns, in its middle.
@@ -367,7 +443,9 @@ MatchPair match_sequences(const Frames& first, const Frames& second, const RayTa
   const Camera &camera1 = first_camera.camera(), &camera2 = second_camera.camera();
   const SequenceStore first_store(first, instants, runs_along_rows(camera2, camera1), options);
   const SequenceStore second_store(second, instants, runs_along_rows(camera1, camera2), options);
-  const SequenceMatcher from_first(first_store, second_store, options), from_second(second_store, first_store, options);
+  SequenceLandings landings(first_store, second_store);
+  const SequenceMatcher from_first(first_store, second_store, options, nullptr, &landings);
+  const SequenceMatcher from_second(second_store, first_store, options, &landings, nullptr);
   return match_both_ways(first_camera, second_camera, from_first, from_second, options, progress);
 }
 
