@@ -22,23 +22,24 @@
 namespace pagesweep {
 namespace {
 
-constexpr std::size_t pixels_at_once = 4 * PlaceBatch::most;
+constexpr std::size_t pixels_at_once = 2 * PlaceBatch::most;
 
 /// A pixel that looks for its match.
 struct Seeker {
+  static constexpr int none = -1;
+  static constexpr float done = std::numeric_limits<float>::infinity();  ///< instead of a distance
+
   std::int32_t index = 0;             ///< see SequenceStore
   std::array<double, 3> direction{};  ///< see CurveFrame
   CurveLine line{};
   float far = 0, near = 0;      ///< [1/mm] at the line's ends
   float z_far = 1, z_near = 1;  ///< of the points there, up to a common scale
   double energy = 0;            ///< of its sequence, in the store's own units
-  std::vector<std::int32_t> pairs;
   OwnSequence own{};
   ScoredCurve curve;
-  std::vector<CurveMinimum> minima;
-  std::span<CurveMinimum> unseen;     ///< minima that are not improved
-  std::span<CurveMinimum> promising;  ///< the lowest; improved, and in order, if there are several
-  std::size_t next = 0;               ///< of the promising ones
+  CurveMinima minima;
+  bool are_improved = false;  ///< the minima
+  int asked = none;           ///< which of them was fitted last
   SequenceFit best;
   bool has_best = false;
   int place_of_best = 0;
@@ -46,11 +47,6 @@ struct Seeker {
   bool has_rival = false;
   std::optional<Match> verdict;
 
-  /// Whether there is a place that may lead. \param slack  of the energy, that its distance may be too large
-  bool has_more(double slack) const {
-    if (next == promising.size()) return false;
-    return !has_best || promising[next].distance_squared <= best.distance_squared + slack * energy;
-  }
   std::span<const std::int32_t> scores_between(int first, int last) const {
     return {curve.first_score() + first, static_cast<std::size_t>(last - first + 1)};
   }
@@ -70,12 +66,7 @@ class SequenceFinder final : public MatchFinder {
         to_(to.arrays()),
         options_(options),
         affine_(options.normalisation == Normalisation::affine),
-        fitter_(from, to, options) {
-    for (Seeker& seeker : seekers_) {
-      seeker.pairs.resize(static_cast<std::size_t>(to_.pairs));
-      seeker.own.pairs = seeker.pairs.data();
-    }
-  }
+        fitter_(from, to, options) {}
 
   Match find(int x, int y, const EpipolarCurve& curve, double) override {
     look_into(curve.view(), curve.origin(), curve.range());
@@ -116,10 +107,8 @@ class SequenceFinder final : public MatchFinder {
   void return_home(std::span<Seeker> seekers);
   bool is_home(const SequenceFit& fit, Seeker& seeker) const;
   void seek(Seeker& seeker);
-  void improve(const Seeker& seeker, std::span<CurveMinimum> minima) const {
-    improve_minima(to_, seeker.curve, seeker.own.square, affine_, minima);
-  }
-  void improve_others(Seeker& seeker) const;
+  std::optional<float> next_place(Seeker& seeker) const;
+  std::optional<float> only_promising_place(Seeker& seeker) const;
   void decide(std::span<Seeker> seekers);
   void ask(Seeker& seeker);
   void ask_at(double inverse_depth, Seeker& seeker);
@@ -175,17 +164,14 @@ void SequenceFinder::lay(std::span<Seeker> seekers) {
 }
 
 void SequenceFinder::begin(Seeker& seeker) {
-  seeker.next = 0;
   seeker.has_best = seeker.has_rival = false;
   seeker.verdict.reset();
-  seeker.unseen = seeker.promising = {};
   if (!(seeker.line.count > 0)) {
     seeker.verdict = Match::none(PixelStatus::outside_view);
     return;
   }
   seeker.energy = from_.energy(seeker.index);
-  from_.copy(seeker.index, seeker.pairs);
-  seeker.own.square = from_.square(seeker.index);
+  seeker.own = from_.sequence(seeker.index);
 }
 
 /// Where a pixel of the other camera found its match at a seeker, and no other one did: whether it is its match, too.
@@ -221,42 +207,47 @@ bool SequenceFinder::is_home(const SequenceFit& fit, Seeker& seeker) const {
 /// Compares with the pixels nearest to the curve, and notes the most promising places.
 void SequenceFinder::seek(Seeker& seeker) {
   score_curve(to_, frame_.lens, seeker.line, seeker.own, seeker.curve);
-  if (seeker.minima.size() <= static_cast<std::size_t>(seeker.curve.count))
-    seeker.minima.resize(static_cast<std::size_t>(seeker.curve.count) + 1);
   constexpr double largest = std::numeric_limits<std::int32_t>::max() - 1;
   const double least = seeker.curve.least, slack = (across + along) * seeker.energy;
   const double limit = std::min(least, options_.max_dissimilarity * seeker.energy) + slack;
-  const int minima =
-      find_minima(seeker.curve, static_cast<std::int32_t>(std::min(limit, largest)), seeker.minima.data());
-  const auto found = std::span(seeker.minima).first(static_cast<std::size_t>(minima));
-  if (found.empty()) return;
-  const double close = found[0].distance_squared + along * seeker.energy;
-  const auto beyond =
-      std::ranges::partition(found.subspan(1), [&](const auto& m) { return m.distance_squared <= close; });
-  seeker.unseen = found.last(beyond.size());
-  seeker.promising = found.first(found.size() - beyond.size());
-  if (seeker.promising.size() > 1) {
-    improve(seeker, seeker.promising);
-    std::ranges::sort(seeker.promising, {}, &CurveMinimum::distance_squared);
-  } else {  // it will be on the side of the better neighbour
-    const std::int32_t* score = seeker.curve.first_score() + static_cast<int>(found[0].place);
-    found[0].place += score[-1] < score[1] ? -0.25f : 0.25f;
-  }
+  find_minima(seeker.curve, static_cast<std::int32_t>(std::min(limit, largest)), seeker.minima);
+  seeker.are_improved = false;
+  seeker.asked = Seeker::none;
 }
 
-/// When the lowest places left the verdict open: which of the others may lead.
-void SequenceFinder::improve_others(Seeker& seeker) const {
-  constexpr std::size_t most = 6;
-  auto others = std::exchange(seeker.unseen, {});
-  if (seeker.has_best) {
-    const double limit = seeker.best.distance_squared + (across + along) * seeker.energy;
-    const auto beyond = std::ranges::partition(others, [&](const auto& m) { return m.distance_squared <= limit; });
-    others = others.first(others.size() - beyond.size());
+/// The lowest pixel on the curve, if no other comes near to it.
+std::optional<float> SequenceFinder::only_promising_place(Seeker& seeker) const {
+  const auto scores = std::span(seeker.minima.score).first(static_cast<std::size_t>(seeker.minima.count));
+  const auto lowest = std::ranges::min_element(scores);
+  const double close = *lowest + along * seeker.energy;
+  const auto rivals = std::ranges::count_if(scores, [&](std::int32_t score) { return score <= close; });
+  if (rivals != 1 && rivals < 5) return std::nullopt;
+  seeker.asked = static_cast<int>(lowest - scores.begin());
+  const auto at = static_cast<std::size_t>(seeker.asked);
+  // It will be on the side of the better neighbour.
+  return 0.75f * static_cast<float>(seeker.minima.place[at]) + 0.25f * static_cast<float>(seeker.minima.beside[at]);
+}
+
+/// The most promising place that was not fitted yet; none if no other may lead.
+std::optional<float> SequenceFinder::next_place(Seeker& seeker) const {
+  CurveMinima& minima = seeker.minima;
+  if (minima.count == 0) return std::nullopt;
+  if (!seeker.are_improved) {
+    const bool is_first = !seeker.has_best && seeker.asked == Seeker::none;
+    if (is_first)
+      if (const auto place = only_promising_place(seeker)) return place;
+    if (minima.count == 1) return std::nullopt;
+    improve_minima(to_, seeker.curve, seeker.own.square, affine_, minima);
+    seeker.are_improved = true;
+    if (!is_first) minima.distance_squared[static_cast<std::size_t>(seeker.asked)] = Seeker::done;
   }
-  improve(seeker, others);
-  std::ranges::sort(others, {}, &CurveMinimum::distance_squared);
-  seeker.promising = others.first(std::min(others.size(), most));
-  seeker.next = 0;
+  const auto distances = std::span(minima.distance_squared).first(static_cast<std::size_t>(minima.count));
+  const auto least = std::ranges::min_element(distances);
+  if (*least == Seeker::done) return std::nullopt;
+  if (seeker.has_best && *least > seeker.best.distance_squared + across * seeker.energy) return std::nullopt;
+  *least = Seeker::done;
+  seeker.asked = static_cast<int>(least - distances.begin());
+  return minima.improved_place[static_cast<std::size_t>(seeker.asked)];
 }
 
 /// In rounds: fits each seeker's most promising place, until a verdict is found or no other place can change it.
@@ -278,12 +269,10 @@ void SequenceFinder::decide(std::span<Seeker> seekers) {
 /// Asks for a fit at the seeker's most promising place, if it needs one for its verdict.
 void SequenceFinder::ask(Seeker& seeker) {
   if (seeker.verdict) return;
-  if (!seeker.unseen.empty() && !seeker.has_more(across)) improve_others(seeker);
-  if (!seeker.has_more(across)) {
+  if (const auto place = next_place(seeker))
+    ask_at(seeker.inverse_depth_at(seeker.curve.share_at(*place)), seeker);
+  else
     judge(seeker);
-    return;
-  }
-  ask_at(seeker.inverse_depth_at(seeker.curve.share_at(seeker.promising[seeker.next++].place)), seeker);
 }
 
 void SequenceFinder::ask_at(double inverse_depth, Seeker& seeker) {
@@ -298,7 +287,7 @@ void SequenceFinder::ask_at(double inverse_depth, Seeker& seeker) {
 
 /// What a fit says about its seeker: it may be the best so far, or make it ambiguous.
 void SequenceFinder::hear(const SequenceFit& fit, Seeker& seeker) const {
-  const int place = static_cast<int>(seeker.promising[seeker.next - 1].place + 0.5f);
+  const int place = seeker.minima.place[static_cast<std::size_t>(seeker.asked)];
   const bool has_rival = seeker.has_best && is_rival(fit, place, seeker);
   if (has_rival) {
     seeker.rival_px = fit.distance_squared < seeker.best.distance_squared ? seeker.best.pixel : fit.pixel;
@@ -318,7 +307,7 @@ void SequenceFinder::judge(Seeker& seeker) const {
   if (matches(seeker)) {
     seeker.verdict = {PixelStatus::ok, seeker.best.pixel, 0, seeker.best.inverse_depth, not_a_number};
   } else {
-    seeker.verdict = Match::none(!seeker.curve.runs.empty() ? PixelStatus::no_match : PixelStatus::outside_view);
+    seeker.verdict = Match::none(seeker.curve.sees_anything() ? PixelStatus::no_match : PixelStatus::outside_view);
   }
 }
 

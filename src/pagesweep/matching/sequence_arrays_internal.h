@@ -32,6 +32,15 @@ struct SequenceArrays {
   const std::int32_t* sequence(std::int32_t index) const { return sequence(index / stride, index % stride); }
 };
 
+/// A sequence that looks for its like, where it is stored.
+struct OwnSequence {
+  const std::int32_t* first;  ///< pair
+  std::ptrdiff_t step;        ///< from a pair to the next
+  std::int32_t square;        ///< scalar product with itself
+
+  std::int32_t pair(int j) const { return first[j * step]; }
+};
+
 /// Scalar product of two pairs of samples.
 inline std::int32_t multiply_pairs(std::int32_t a, std::int32_t b) {
   const auto low = [](std::int32_t pair) { return static_cast<std::int32_t>(static_cast<std::int16_t>(pair)); };

@@ -121,7 +121,7 @@ void SequenceFitter::multiply_all(std::span<SequenceFit* const> fits) {
   for (std::size_t lane = 0; lane < fits.size(); ++lane) {
     const SequenceFit& fit = *fits[lane];
     const Loaded loaded = load(fit, lane);
-    const CrossingProducts products = multiply(to_arrays_, loaded.crossings, fit.own.pairs);
+    const CrossingProducts products = multiply(to_arrays_, loaded.crossings, fit.own);
     batch_.gg[lane] = static_cast<float>(fit.own.square);
     for (std::size_t i = 0; i < crossings; ++i) {
       batch_.usable[i][lane] = loaded.usable[i] ? 1 : 0;
@@ -178,7 +178,7 @@ void SequenceFitter::find_sigmas(std::span<const SequenceFit* const> fits, std::
     }
     // What a change of gain would do just as well is no change.
     mixtures_.change_of_own[lane] = static_cast<float>(-fit.change_along_own);
-    enter(to_arrays_, loaded.crossings, fit.own.pairs, lane, mixtures_);
+    enter(to_arrays_, loaded.crossings, fit.own, lane, mixtures_);
     sigmas_px[lane] = rounding_variance;
   }
   sum_weighted_residuals(to_arrays_.pairs, mixtures_);

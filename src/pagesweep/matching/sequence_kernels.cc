@@ -50,23 +50,23 @@ std::int32_t interpolate(const SequenceArrays& to, const Crossings& crossings, s
   return pair;
 }
 
-CrossingProducts Multiply(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own) {
+CrossingProducts Multiply(const SequenceArrays& to, const Crossings& crossings, const OwnSequence& own) {
   CrossingProducts products{};
   for (int j = 0; j < to.pairs; ++j)
     for (std::size_t a = 0; a < Crossings::count; ++a) {
       const std::int32_t s = interpolate(to, crossings, a, j);
-      products.gs[a] += multiply_pairs(s, own[j]);
+      products.gs[a] += multiply_pairs(s, own.pair(j));
       for (std::size_t b = a; b < Crossings::count; ++b)
         products.ss[a][b] += multiply_pairs(s, interpolate(to, crossings, b, j));
     }
   return products;
 }
 
-void Enter(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own, std::size_t pixel,
+void Enter(const SequenceArrays& to, const Crossings& crossings, const OwnSequence& own, std::size_t pixel,
            MixtureBatch& batch) {
   for (int j = 0; j < to.pairs; ++j) {
     const std::size_t at = static_cast<std::size_t>(j) * MixtureBatch::most + pixel;
-    batch.own[at] = own[j];
+    batch.own[at] = own.pair(j);
     for (std::size_t k = 0; k < Crossings::count; ++k)
       batch.crossings[at * Crossings::count + k] = interpolate(to, crossings, k, j);
   }
@@ -135,13 +135,13 @@ void MultiplyNeighbours(const SequenceArrays& arrays, int line, std::int32_t* ow
   }
 }
 
-CrossingProducts Multiply(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own) {
+CrossingProducts Multiply(const SequenceArrays& to, const Crossings& crossings, const OwnSequence& own) {
   using Tag = CrossingReader::Tag;
   const CrossingReader reader(to, crossings);
   PairSums<Tag> with_own, with_same, with_next, with_second;
   for (int j = 0; j < to.pairs; ++j) {
     const auto s = reader.read(j);
-    with_own.add(s, hn::Set(Tag(), own[j]));
+    with_own.add(s, hn::Set(Tag(), own.pair(j)));
     with_same.add(s, s);
     with_next.add(s, hn::Shuffle0321(s));
     with_second.add(s, hn::Shuffle1032(s));
@@ -159,13 +159,13 @@ CrossingProducts Multiply(const SequenceArrays& to, const Crossings& crossings, 
   return products;
 }
 
-void Enter(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own, std::size_t pixel,
+void Enter(const SequenceArrays& to, const Crossings& crossings, const OwnSequence& own, std::size_t pixel,
            MixtureBatch& batch) {
   const CrossingReader reader(to, crossings);
   std::int32_t* out = batch.crossings.data() + pixel * Crossings::count;
   for (int j = 0; j < to.pairs; ++j, out += MixtureBatch::most * Crossings::count) {
     hn::StoreU(reader.read(j), CrossingReader::Tag(), out);
-    batch.own[static_cast<std::size_t>(j) * MixtureBatch::most + pixel] = own[j];
+    batch.own[static_cast<std::size_t>(j) * MixtureBatch::most + pixel] = own.pair(j);
   }
 }
 #endif
@@ -221,13 +221,20 @@ void SumWeightedResiduals(int pairs, MixtureBatch& batch) {
   }
 }
 
+HWY_INLINE FloatVector load(const float* samples) { return hn::LoadU(Floats(), samples); }
+HWY_INLINE FloatVector load(const std::uint8_t* samples) {
+  const hn::Rebind<std::uint8_t, Floats> bytes;
+  return hn::ConvertTo(Floats(), hn::PromoteTo(Integers(), hn::LoadU(bytes, samples)));
+}
+
 /// As many pixels of the rows as a vector has lanes.
+template <class Sample>
 class PixelColumn {
  public:
-  PixelColumn(const GrayRows& gray, int first) : gray_(gray), first_(first) {}
+  PixelColumn(const SampleRows<Sample>& gray, int first) : gray_(gray), first_(first) {}
 
-  FloatVector at(std::size_t frame) const {
-    const FloatVector gray = hn::LoadU(Floats(), gray_.frames[frame] + first_);
+  HWY_INLINE FloatVector at(std::size_t frame) const {
+    const FloatVector gray = hn::Sub(load(gray_.frames[frame] + first_), set(gray_.black_level));
     return hn::Max(hn::Min(gray, set(gray_.range)), set(-gray_.range));
   }
 
@@ -273,14 +280,15 @@ class PixelColumn {
   }
 
  private:
-  const GrayRows& gray_;
+  const SampleRows<Sample>& gray_;
   int first_;
 };
 
-void PackSequences(const GrayRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics) {
+template <class Sample>
+void pack(const SampleRows<Sample>& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics) {
   const FloatVector full_size = set(gray.range * std::sqrt(static_cast<float>(gray.frames.size())));
   for (int first = 0; first < gray.pixels; first += lanes) {
-    const PixelColumn column(gray, first);
+    const PixelColumn<Sample> column(gray, first);
     FloatVector energy;
     const FloatVector mean = column.summarise(statistics, energy);
     const FloatVector size = affine ? hn::Sqrt(hn::Max(energy, set(1e-6f))) : full_size;
@@ -290,6 +298,13 @@ void PackSequences(const GrayRows& gray, bool affine, const PairPlaces& out, con
   }
 }
 
+void PackGray(const GrayRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics) {
+  pack(gray, affine, out, statistics);
+}
+void PackBytes(const ByteRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics) {
+  pack(gray, affine, out, statistics);
+}
+
 }  // namespace
 }  // namespace pagesweep::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -297,25 +312,30 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace pagesweep {
 
-HWY_EXPORT(PackSequences);
+HWY_EXPORT(PackGray);
+HWY_EXPORT(PackBytes);
 HWY_EXPORT(MultiplyNeighbours);
 HWY_EXPORT(Multiply);
 HWY_EXPORT(Enter);
 HWY_EXPORT(SumWeightedResiduals);
 
 void pack_sequences(const GrayRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics) {
-  HWY_DYNAMIC_DISPATCH(PackSequences)(gray, affine, out, statistics);
+  HWY_DYNAMIC_DISPATCH(PackGray)(gray, affine, out, statistics);
+}
+
+void pack_sequences(const ByteRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics) {
+  HWY_DYNAMIC_DISPATCH(PackBytes)(gray, affine, out, statistics);
 }
 
 void multiply_neighbours(const SequenceArrays& arrays, int line, std::int32_t* own, std::int32_t* next) {
   HWY_DYNAMIC_DISPATCH(MultiplyNeighbours)(arrays, line, own, next);
 }
 
-CrossingProducts multiply(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own) {
+CrossingProducts multiply(const SequenceArrays& to, const Crossings& crossings, const OwnSequence& own) {
   return HWY_DYNAMIC_DISPATCH(Multiply)(to, crossings, own);
 }
 
-void enter(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own, std::size_t pixel,
+void enter(const SequenceArrays& to, const Crossings& crossings, const OwnSequence& own, std::size_t pixel,
            MixtureBatch& batch) {
   HWY_DYNAMIC_DISPATCH(Enter)(to, crossings, own, pixel, batch);
 }

@@ -12,11 +12,15 @@
 namespace pagesweep {
 
 /// Gray values of some pixels: a row for each frame.
-struct GrayRows {
-  std::span<const float* const> frames;  ///< a multiple of score_padding values can be read of each
+template <class Sample>
+struct SampleRows {
+  std::span<const Sample* const> frames;  ///< a multiple of score_padding values can be read of each
   int pixels;
-  float range;  ///< [gray values] what is above stands for as much
+  float range;            ///< [gray values] what is above stands for as much
+  float black_level = 0;  ///< [gray values] is taken off
 };
+using GrayRows = SampleRows<float>;
+using ByteRows = SampleRows<std::uint8_t>;
 
 /// What is known about each of these pixels' sequences. There is room for a multiple of score_padding pixels.
 struct SequenceStatistics {
@@ -35,6 +39,7 @@ struct PairPlaces {
 /// Stores some pixels' sequences, two frames in 32 bits; an odd one is followed by a 0.
 /// \param affine  the mean is removed and the length becomes sequence_scale; else `range` in all frames has that length
 void pack_sequences(const GrayRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics);
+void pack_sequences(const ByteRows& gray, bool affine, const PairPlaces& out, const SequenceStatistics& statistics);
 
 /// Scalar products of a line's sequences with themselves and with those of their next places.
 /// \param own, next  [place] there is room for a multiple of score_padding
@@ -54,8 +59,7 @@ struct CrossingProducts {
   std::int32_t gs[Crossings::count];                    ///< g . S_i
   std::int32_t ss[Crossings::count][Crossings::count];  ///< S_i . S_j, where i <= j
 };
-/// \param own  the pairs of g, one behind the other
-CrossingProducts multiply(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own);
+CrossingProducts multiply(const SequenceArrays& to, const Crossings& crossings, const OwnSequence& own);
 
 /// Sequences between four crossings, and how they change along their curves, for some pixels.
 struct MixtureBatch {
@@ -69,7 +73,7 @@ struct MixtureBatch {
   alignas(64) Each rrdd{};           ///< sum over the frames of the squared product of residual r and change d
 };
 /// Enters one pixel's sequence, and those at the crossings.
-void enter(const SequenceArrays& to, const Crossings& crossings, const std::int32_t* own, std::size_t pixel,
+void enter(const SequenceArrays& to, const Crossings& crossings, const OwnSequence& own, std::size_t pixel,
            MixtureBatch& batch);
 void sum_weighted_residuals(int pairs, MixtureBatch& batch);
 

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -13,6 +12,7 @@
 #include <random>
 #include <vector>
 
+#include "pagesweep/base/instruction_sets_testing.h"
 #include "pagesweep/matching/sequence_search_internal.h"
 
 namespace pagesweep {
@@ -38,7 +38,6 @@ class SequenceKernels : public testing::TestWithParam<int> {
       multiply_neighbours(arrays(), y, &own[static_cast<std::size_t>(y * stride)],
                           &next[static_cast<std::size_t>(y * stride)]);
   }
-  ~SequenceKernels() override { hwy::SetSupportedTargetsForTest(0); }
 
   void set(int x, int y, int frame, std::int16_t value) {
     auto* pair = reinterpret_cast<char*>(data.data() + (arrays().sequence(y, x) - data.data()) + frame / 2 * stride);
@@ -61,15 +60,6 @@ class SequenceKernels : public testing::TestWithParam<int> {
     std::vector<std::int32_t> result;
     for (int j = 0; j < pairs; ++j) result.push_back(arrays().sequence(y, x)[j * stride]);
     return result;
-  }
-
-  template <class Body>
-  static void on_every_target(const Body& body) {
-    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      SCOPED_TRACE(hwy::TargetName(target));
-      hwy::SetSupportedTargetsForTest(target);
-      body();
-    }
   }
 };
 
@@ -96,7 +86,7 @@ LineBatch lines_of_some_pixels(bool along_rows) {
 }
 
 TEST_P(SequenceKernels, LinesEndWhereThePictureDoesOrTheDepths) {
-  on_every_target([&] {
+  on_every_instruction_set([&] {
     const LineBatch batch = lines_of_some_pixels(true);
     EXPECT_EQ(batch.count[9], 0);
     for (std::size_t k = 0; k < LineBatch::most; ++k) {
@@ -124,10 +114,10 @@ TEST_P(SequenceKernels, LinesEndWhereThePictureDoesOrTheDepths) {
 /// Across the picture's lines, none of the curves can be compared in runs.
 TEST_P(SequenceKernels, ScoresAreSquaredDifferencesFromTheNearestPixels) {
   for (const bool along_rows : {true, false})
-    on_every_target([&] {
+    on_every_instruction_set([&] {
       const SequenceArrays to = arrays(along_rows);
       const std::vector<std::int32_t> g = copy(5, 1);
-      const OwnSequence own_sequence{g.data(), own[static_cast<std::size_t>(to.index(1, 5))]};
+      const OwnSequence own_sequence{g.data(), 1, own[static_cast<std::size_t>(to.index(1, 5))]};
       const LineBatch batch = lines_of_some_pixels(along_rows);
       ScoredCurve curve;
       for (const std::size_t k : {0U, 4U, 12U}) {
@@ -157,7 +147,9 @@ TEST_P(SequenceKernels, MinimaAreThoseOfTheScoresAndNearerThanThem) {
   constexpr int count = 35, row = 3;
   ScoredCurve curve;
   curve.count = count;
-  curve.runs = {{0, 20, arrays().index(row, 0)}, {20, count, arrays().index(row + 1, 20)}};
+  curve.pixels.assign(score_padding + 64 + score_padding, -1);
+  for (int k = 0; k < count; ++k)
+    curve.pixels[static_cast<std::size_t>(score_padding + k)] = arrays().index(k < 20 ? row : row + 1, k);
   curve.scores.assign(score_padding + 64 + score_padding, std::numeric_limits<std::int32_t>::max());
   const Eigen::VectorXd g = sequence(2, 9);
   for (int k = 0; k < count; ++k)
@@ -167,34 +159,35 @@ TEST_P(SequenceKernels, MinimaAreThoseOfTheScoresAndNearerThanThem) {
   std::vector<std::int32_t> sorted(first, first + count);
   std::ranges::sort(sorted);
   const std::int32_t limit = sorted[count * 3 / 4];
-  std::vector<float> expected;
+  std::vector<int> expected;
   for (int k = 0; k < count; ++k)
-    if (first[k] <= limit && first[k] < first[k - 1] && first[k] <= first[k + 1])
-      expected.push_back(static_cast<float>(k));
+    if (first[k] <= limit && first[k] < first[k - 1] && first[k] <= first[k + 1]) expected.push_back(k);
   ASSERT_GT(expected.size(), 4U);
-  on_every_target([&] {
-    std::array<CurveMinimum, 64> room{};
-    const auto minima = std::span(room).first(static_cast<std::size_t>(find_minima(curve, limit, room.data())));
-    EXPECT_EQ(minima[0].distance_squared, static_cast<float>(sorted[0]));
-    for (const CurveMinimum& m : minima)
-      EXPECT_EQ(m.distance_squared, static_cast<float>(first[static_cast<int>(m.place)]));
-    std::ranges::sort(minima, {}, &CurveMinimum::place);
-    ASSERT_TRUE(std::ranges::equal(minima, expected, {}, &CurveMinimum::place));
+  on_every_instruction_set([&] {
+    CurveMinima minima;
+    find_minima(curve, limit, minima);
+    ASSERT_EQ(minima.count, static_cast<int>(expected.size()));
     improve_minima(arrays(), curve, static_cast<std::int32_t>(g.squaredNorm()), false, minima);
     for (std::size_t i = 0; i < expected.size(); ++i) {
-      const auto [place, distance_squared] = minima[i];
-      EXPECT_LE(std::abs(place - expected[i]), 1);
+      const int at = expected[i], beside = first[at - 1] < first[at + 1] ? at - 1 : at + 1;
+      EXPECT_EQ(minima.place[i], at);
+      EXPECT_EQ(minima.score[i], first[at]);
+      EXPECT_EQ(minima.beside[i], beside);
+      EXPECT_EQ(minima.beside_score[i], first[beside]);
+      const float place = minima.improved_place[i];
+      EXPECT_GE(place, std::min(at, beside));
+      EXPECT_LE(place, std::max(at, beside));
       const int low = std::min(static_cast<int>(place), count - 2);
       const Eigen::VectorXd a = sequence(curve.pixel_at(low)), b = sequence(curve.pixel_at(low + 1));
-      EXPECT_NEAR(distance_squared, (g - a - (place - static_cast<float>(low)) * (b - a)).squaredNorm(),
+      EXPECT_NEAR(minima.distance_squared[i], (g - a - (place - static_cast<float>(low)) * (b - a)).squaredNorm(),
                   1e-4 * g.squaredNorm());
-      EXPECT_LE(distance_squared, 1.00001 * first[static_cast<int>(expected[i])]);
+      EXPECT_LE(minima.distance_squared[i], 1.00001 * first[at]);
     }
   });
 }
 
 TEST_P(SequenceKernels, NeighboursAreMultiplied) {
-  on_every_target([&] {
+  on_every_instruction_set([&] {
     std::vector<std::int32_t> with_own(stride), with_next(stride);
     multiply_neighbours(arrays(), 4, with_own.data(), with_next.data());
     for (int x = 0; x + 1 < width; ++x) {
@@ -235,9 +228,9 @@ TEST_P(SequenceKernels, ProductsAreThoseOfTheInterpolatedSequences) {
     }
     const Eigen::MatrixXd expected = s.transpose() * s;
     const Eigen::VectorXd with_g = s.transpose() * sequence(9, 2);
-    on_every_target([&] {
+    on_every_instruction_set([&] {
       const Crossings crossings = some_crossings(arrays(), are_neighbours, both.data());
-      const CrossingProducts products = multiply(arrays(), crossings, g.data());
+      const CrossingProducts products = multiply(arrays(), crossings, {g.data(), 1, 0});
       for (int i = 0; i < 4; ++i) {
         EXPECT_NEAR(products.gs[i], with_g[i], rounding);
         for (int j = i; j < 4; ++j) EXPECT_NEAR(products.ss[i][j], expected(i, j), rounding);
@@ -260,7 +253,7 @@ TEST_P(SequenceKernels, ResidualsAreSummedOverTheFrames) {
     d += change[i] * s;
   }
   const double expected = (r.array() * d.array()).matrix().squaredNorm();
-  on_every_target([&] {
+  on_every_instruction_set([&] {
     for (const std::size_t pixel : {0U, 7U, 15U}) {
       MixtureBatch batch;
       batch.own.resize(static_cast<std::size_t>(pairs) * MixtureBatch::most);
@@ -270,7 +263,7 @@ TEST_P(SequenceKernels, ResidualsAreSummedOverTheFrames) {
         batch.change[k][pixel] = change[k];
       }
       batch.change_of_own[pixel] = change_of_own;
-      enter(arrays(), some_crossings(arrays(), true, both.data()), g.data(), pixel, batch);
+      enter(arrays(), some_crossings(arrays(), true, both.data()), {g.data(), 1, 0}, pixel, batch);
       sum_weighted_residuals(pairs, batch);
       EXPECT_NEAR(batch.rrdd[pixel], expected, 4e-3 * expected);  // interpolated samples are whole numbers
     }
@@ -290,11 +283,11 @@ TEST_P(SequenceKernels, PackedSequencesAreNormalised) {
   }
   for (const bool affine : {false, true})
     for (const bool side_by_side : {false, true})
-      on_every_target([&] {
+      on_every_instruction_set([&] {
         alignas(64) std::array<float, room> energy, lowest, highest, scale;
         std::vector<std::int32_t> out(static_cast<std::size_t>(room * pairs), 77);
         const std::ptrdiff_t pair_step = side_by_side ? room : 1, pixel_step = side_by_side ? 1 : pairs;
-        pack_sequences({pointers, pixels, range}, affine, {out.data(), pair_step, pixel_step},
+        pack_sequences(GrayRows{pointers, pixels, range}, affine, {out.data(), pair_step, pixel_step},
                        {energy.data(), lowest.data(), highest.data(), scale.data()});
         for (std::size_t p = 0; p < pixels; ++p) {
           Eigen::VectorXf g(frames);
@@ -316,6 +309,31 @@ TEST_P(SequenceKernels, PackedSequencesAreNormalised) {
           }
         }
       });
+}
+
+TEST_P(SequenceKernels, BytesArePackedAsTheirGrayValues) {
+  constexpr int pixels = 32;
+  constexpr float black_level = 4, range = 200;
+  std::vector<std::vector<std::uint8_t>> bytes(static_cast<std::size_t>(frames), std::vector<std::uint8_t>(pixels));
+  std::vector<std::vector<float>> grays(bytes.size(), std::vector<float>(pixels));
+  std::vector<const std::uint8_t*> byte_rows;
+  std::vector<const float*> gray_rows;
+  std::uniform_int_distribution<int> gray(0, 255);
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    for (std::uint8_t& b : bytes[i]) b = static_cast<std::uint8_t>(gray(random));
+    std::ranges::transform(bytes[i], grays[i].begin(), [](std::uint8_t b) { return b - black_level; });
+    byte_rows.push_back(bytes[i].data());
+    gray_rows.push_back(grays[i].data());
+  }
+  on_every_instruction_set([&] {
+    alignas(64) std::array<std::array<float, pixels>, 4> known, expected_known;
+    const auto numbers = [](auto& s) { return SequenceStatistics{s[0].data(), s[1].data(), s[2].data(), s[3].data()}; };
+    std::vector<std::int32_t> out(static_cast<std::size_t>(pixels * pairs)), expected = out;
+    pack_sequences(ByteRows{byte_rows, pixels, range, black_level}, true, {out.data(), pixels, 1}, numbers(known));
+    pack_sequences(GrayRows{gray_rows, pixels, range}, true, {expected.data(), pixels, 1}, numbers(expected_known));
+    EXPECT_EQ(out, expected);
+    EXPECT_EQ(known, expected_known);
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Frames, SequenceKernels, testing::Values(13, 32, 40),

@@ -2,10 +2,8 @@
 #include "pagesweep/matching/sequence_search_internal.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 // Not worth their time to compile beside SSE4, AVX2 and AVX-512.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
@@ -142,7 +140,6 @@ class CurveScorer {
       : to_(to), lens_(lens), line_(line), own_(own), curve_(curve) {}
 
   void score() {
-    curve_.runs.clear();
     if (line_.straight > 0) {
       curve_.nodes.assign({line_.from, line_.to});
       begin_places(line_.from, line_.to);
@@ -158,6 +155,7 @@ class CurveScorer {
       }
     }
     hn::StoreU(hn::Set(Integers(), highest), Integers(), score_at(curve_.count));
+    *pixel_at(-1) = *pixel_at(curve_.count) = nothing;
     curve_.least = hn::GetLane(hn::MinOfLanes(Integers(), least_));
   }
 
@@ -167,12 +165,16 @@ class CurveScorer {
     float slope, at_0;
   };
 
+  static constexpr std::int32_t nothing = -1;
+
   std::int32_t* score_at(int k) { return curve_.scores.data() + score_padding + k; }
+  std::int32_t* pixel_at(int k) { return curve_.pixels.data() + score_padding + k; }
 
   void make_room(int count) {
     const auto room = static_cast<std::size_t>(count) + 3 * score_padding;
     if (curve_.scores.size() >= room) return;
     curve_.scores.resize(room);
+    curve_.pixels.resize(room);
     *score_at(-1) = highest;
   }
 
@@ -219,7 +221,10 @@ class CurveScorer {
     curve_.first = static_cast<float>(first_);
     curve_.count = end_ - first_;
     make_room(curve_.count);
-    for (int k = 0; k < curve_.count; k += lanes) hn::StoreU(hn::Set(Integers(), highest), Integers(), score_at(k));
+    for (int k = 0; k < curve_.count; k += lanes) {
+      hn::StoreU(hn::Set(Integers(), highest), Integers(), score_at(k));
+      hn::StoreU(hn::Set(Integers(), nothing), Integers(), pixel_at(k));
+    }
   }
 
   /// Straight from node to node.
@@ -255,7 +260,6 @@ class CurveScorer {
   /// The places first ... last - 1 of a line, whole vectors at a time.
   void score_run(int line, int first, int last) {
     const Integers tag;
-    curve_.runs.push_back({first - first_, last - first_, to_.index(line, first)});
     const IntegerVector ahead = hn::Iota(tag, 0);
     const int begin = first / lanes * lanes;
     const std::int32_t* there = to_.sequence(line, begin);
@@ -263,9 +267,11 @@ class CurveScorer {
     for (int k = 0; begin + k < last; k += lanes) {
       const auto inside =
           hn::And(hn::Gt(ahead, hn::Set(tag, first - 1 - begin - k)), hn::Lt(ahead, hn::Set(tag, last - begin - k)));
-      std::int32_t* out = score_at(begin - first_ + k);
+      std::int32_t *out = score_at(begin - first_ + k), *pixels = pixel_at(begin - first_ + k);
       const IntegerVector scores = hn::IfThenElse(inside, score(there + k, index + k), hn::LoadU(tag, out));
+      const IntegerVector here = hn::Add(ahead, hn::Set(tag, index + k));
       hn::StoreU(scores, tag, out);
+      hn::StoreU(hn::IfThenElse(inside, here, hn::LoadU(tag, pixels)), tag, pixels);
       least_ = hn::Min(least_, scores);
     }
   }
@@ -284,9 +290,10 @@ class CurveScorer {
       const auto node = static_cast<std::size_t>(k);
       const int place = nearest(curve_.nodes[node], to_.places), line = nearest(curve_.across[node], to_.lines);
       *score_at(k) = highest;
+      *pixel_at(k) = nothing;
       if (place < 0 || line < 0) continue;
       const std::int32_t pixel = to_.index(line, place);
-      curve_.runs.push_back({k, k + 1, pixel});
+      *pixel_at(k) = pixel;
       *score_at(k) = hn::GetLane(score(to_.sequence(line, place), pixel));
       least_ = hn::Min(least_, hn::Set(Integers(), *score_at(k)));
     }
@@ -305,14 +312,14 @@ class CurveScorer {
     const Integers tag;
 #if HWY_TARGET == HWY_SCALAR
     std::int32_t sum = 0;
-    for (int j = 0; j < to_.pairs; ++j, there += to_.stride) sum += multiply_pairs(*there, own_.pairs[j]);
+    for (int j = 0; j < to_.pairs; ++j, there += to_.stride) sum += multiply_pairs(*there, own_.pair(j));
     return hn::Set(tag, sum);
 #else
     const hn::Repartition<std::int16_t, Integers> samples;
     IntegerVector sum = hn::Zero(tag), more = sum;
     for (int j = 0; j < to_.pairs; ++j, there += to_.stride)
       sum = hn::ReorderWidenMulAccumulate(tag, hn::BitCast(samples, hn::LoadU(tag, there)),
-                                          hn::BitCast(samples, hn::Set(tag, own_.pairs[j])), sum, more);
+                                          hn::BitCast(samples, hn::Set(tag, own_.pair(j))), sum, more);
     return hn::RearrangeToOddPlusEven(sum, more);
 #endif
   }
@@ -332,73 +339,92 @@ void ScoreCurve(const SequenceArrays& to, const LensNumbers& lens, const CurveLi
   CurveScorer(to, lens, line, own, curve).score();
 }
 
-/// How near a sequence g comes to the line from S_0 to S_1, all by their scalar products.
-/// \return share of the way, and distance
-std::pair<float, float> nearest_on_line(float gg, float g0, float g1, float s0, float s1, float s01, bool affine) {
-  const float a = g0 * s1 - g1 * s01, b = g1 * s0 - g0 * s01, length_squared = s0 - 2 * s01 + s1;
-  float share = 0;
-  if (affine && a + b > 0) share = b / (a + b);
-  if (!affine && length_squared > 0) share = (g1 - g0 + s0 - s01) / length_squared;
-  share = std::clamp(share, 0.0f, 1.0f);
-  const float gs = g0 + share * (g1 - g0), ss = s0 + share * (2 * (s01 - s0) + share * length_squared);
-  const float distance_squared = affine ? (gs > 0 && ss > 0 ? gg - gs * gs / ss : gg) : gg - 2 * gs + ss;
-  return {share, distance_squared};
-}
-
-/// Scalar product of the sequences of two pixels.
-std::int32_t product(const SequenceArrays& to, std::int32_t a, std::int32_t b) {
-  if (a == b + 1) return to.next[b];
-  if (b == a + 1) return to.next[a];
-  return multiply(to, a, b);
-}
-
-/// A minimum of the scores, improved.
-CurveMinimum improve(const SequenceArrays& to, const ScoredCurve& curve, std::int32_t own_square, bool affine, int k) {
-  const auto square = [&](std::int32_t pixel) {
-    return static_cast<float>(to.squares ? to.squares[pixel] : sequence_scale * sequence_scale);
-  };
-  const std::int32_t* scores = curve.first_score();
-  const int neighbour = scores[k - 1] < scores[k + 1] ? k - 1 : k + 1;
-  CurveMinimum best{static_cast<float>(k), static_cast<float>(scores[k])};
-  if (neighbour < 0 || neighbour >= curve.count) return best;
-  const std::int32_t here = curve.pixel_at(k), there = curve.pixel_at(neighbour);
-  if (here == there || there < 0) return best;
-  const auto gg = static_cast<float>(own_square), s0 = square(here), s1 = square(there);
-  const float g0 = 0.5f * (gg + s0 - static_cast<float>(scores[k]));
-  const float g1 = 0.5f * (gg + s1 - static_cast<float>(scores[neighbour]));
-  const auto s01 = static_cast<float>(product(to, here, there));
-  const auto [share, distance_squared] = nearest_on_line(gg, g0, g1, s0, s1, s01, affine);
-  return {static_cast<float>(k) + share * static_cast<float>(neighbour - k), distance_squared};
-}
-
-int FindMinima(const ScoredCurve& curve, std::int32_t limit, CurveMinimum* minima) {
-  const Integers integers;
-  int found = 0, lowest = 0;
+void FindMinima(const ScoredCurve& curve, std::int32_t limit, CurveMinima& minima) {
+  const Integers tag;
+  minima.make_room(curve.count);
+  int found = 0;
   for (int first = 0; first < curve.count; first += lanes) {
     const std::int32_t* scores = curve.first_score() + first;
-    const IntegerVector here = hn::LoadU(integers, scores);
-    const IntegerVector before = hn::LoadU(integers, scores - 1), behind = hn::LoadU(integers, scores + 1);
-    const auto too_large = hn::Or(hn::Gt(here, hn::Set(integers, limit)), hn::Gt(here, behind));
+    const IntegerVector here = hn::LoadU(tag, scores);
+    const IntegerVector before = hn::LoadU(tag, scores - 1), behind = hn::LoadU(tag, scores + 1);
+    const auto too_large = hn::Or(hn::Gt(here, hn::Set(tag, limit)), hn::Gt(here, behind));
     const auto is_minimum = hn::AndNot(too_large, hn::Lt(here, before));
-    if (hn::AllFalse(integers, is_minimum)) continue;
-    std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(integers, is_minimum, bytes);
-    for (unsigned bits = bytes[0] | static_cast<unsigned>(bytes[1]) << 8; bits != 0; bits &= bits - 1) {
-      const int place = first + std::countr_zero(bits);
-      if (place >= curve.count) break;
-      minima[found] = {static_cast<float>(place), static_cast<float>(curve.first_score()[place])};
-      lowest = minima[found].distance_squared < minima[lowest].distance_squared ? found : lowest;
-      ++found;
+    if (hn::AllFalse(tag, is_minimum)) continue;
+    const IntegerVector place = hn::Iota(tag, first);
+    const IntegerVector side = hn::IfThenElse(hn::Lt(before, behind), hn::Set(tag, -1), hn::Set(tag, 1));
+    const auto keep = [&](IntegerVector values, std::vector<std::int32_t>& out) {
+      hn::StoreU(hn::Compress(values, is_minimum), tag, &out[static_cast<std::size_t>(found)]);
+    };
+    keep(place, minima.place);
+    keep(here, minima.score);
+    keep(hn::Add(place, side), minima.beside);
+    keep(hn::Min(before, behind), minima.beside_score);
+    found += static_cast<int>(hn::CountTrue(tag, is_minimum));
+  }
+  // Behind the end all scores are the highest, which a limit is below.
+  minima.count = found;
+}
+
+/// What is known of a vector of minima and the places beside, but for their scores.
+struct MinimaProducts {
+  alignas(64) float is_pair[lanes], here[lanes], beside[lanes], both[lanes];  ///< 1 or 0; scalar products
+
+  MinimaProducts(const SequenceArrays& to, const ScoredCurve& curve, const CurveMinima& minima, std::size_t first) {
+    const auto square = [&](std::int32_t pixel) {
+      return static_cast<float>(to.squares ? to.squares[pixel] : sequence_scale * sequence_scale);
+    };
+    const FloatVector zero = hn::Zero(Floats());
+    for (float* values : {is_pair, here, beside, both}) hn::Store(zero, Floats(), values);
+    const std::size_t count = std::min<std::size_t>(lanes, static_cast<std::size_t>(minima.count) - first);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::int32_t a = curve.pixel_at(minima.place[first + k]), b = curve.pixel_at(minima.beside[first + k]);
+      if (a == b || b < 0) continue;
+      is_pair[k] = 1;
+      here[k] = square(a);
+      beside[k] = square(b);
+      both[k] = static_cast<float>(std::abs(a - b) == 1 ? to.next[std::min(a, b)] : multiply(to, a, b));
     }
   }
-  std::swap(minima[0], minima[lowest]);
-  return found;
+};
+
+/// How near a sequence g comes to the lines between pairs of pixels.
+void improve_some(const MinimaProducts& products, FloatVector gg, bool affine, std::size_t first, CurveMinima& minima) {
+  const Integers tag;
+  const auto integers = [&](const std::vector<std::int32_t>& values) { return hn::LoadU(tag, &values[first]); };
+  const FloatVector score = hn::ConvertTo(Floats(), integers(minima.score));
+  const FloatVector beside_score = hn::ConvertTo(Floats(), integers(minima.beside_score));
+  const FloatVector place = hn::ConvertTo(Floats(), integers(minima.place));
+  const FloatVector way = hn::Sub(hn::ConvertTo(Floats(), integers(minima.beside)), place);
+  const FloatVector s0 = hn::Load(Floats(), products.here), s1 = hn::Load(Floats(), products.beside);
+  const FloatVector s01 = hn::Load(Floats(), products.both);
+  const FloatVector g0 = hn::Mul(set(0.5f), hn::Sub(hn::Add(gg, s0), score));
+  const FloatVector g1 = hn::Mul(set(0.5f), hn::Sub(hn::Add(gg, s1), beside_score));
+  const FloatVector length_squared = hn::Add(hn::NegMulAdd(set(2), s01, s0), s1);
+  FloatVector part, whole;
+  if (affine) {  // g's coefficients in the plane, times a determinant
+    part = hn::MulSub(g1, s0, hn::Mul(g0, s01));
+    whole = hn::Add(part, hn::MulSub(g0, s1, hn::Mul(g1, s01)));
+  } else {
+    part = hn::Add(hn::Sub(g1, g0), hn::Sub(s0, s01));
+    whole = length_squared;
+  }
+  const auto is_known = hn::Gt(whole, hn::Zero(Floats()));
+  const FloatVector quotient = hn::IfThenElseZero(is_known, hn::Div(part, whole));
+  const FloatVector share = hn::Min(hn::Max(quotient, hn::Zero(Floats())), set(1));
+  const FloatVector gs = hn::MulAdd(share, hn::Sub(g1, g0), g0);
+  const FloatVector ss = hn::MulAdd(share, hn::MulAdd(share, length_squared, hn::Mul(set(2), hn::Sub(s01, s0))), s0);
+  const auto alike = hn::And(hn::Gt(gs, hn::Zero(Floats())), hn::Gt(ss, hn::Zero(Floats())));
+  const FloatVector distance = affine ? hn::IfThenElse(alike, hn::NegMulAdd(gs, hn::Div(gs, ss), gg), gg)
+                                      : hn::Add(hn::NegMulAdd(set(2), gs, gg), ss);
+  const auto is_pair = hn::Gt(hn::Load(Floats(), products.is_pair), hn::Zero(Floats()));
+  hn::StoreU(hn::IfThenElse(is_pair, hn::MulAdd(share, way, place), place), Floats(), &minima.improved_place[first]);
+  hn::StoreU(hn::IfThenElse(is_pair, distance, score), Floats(), &minima.distance_squared[first]);
 }
 
 void ImproveMinima(const SequenceArrays& to, const ScoredCurve& curve, std::int32_t own_square, bool affine,
-                   std::span<CurveMinimum> minima) {
-  for (CurveMinimum& minimum : minima)
-    minimum = improve(to, curve, own_square, affine, static_cast<int>(minimum.place));
+                   CurveMinima& minima) {
+  for (std::size_t first = 0; first < static_cast<std::size_t>(minima.count); first += lanes)
+    improve_some({to, curve, minima, first}, set(static_cast<float>(own_square)), affine, first, minima);
 }
 
 }  // namespace
@@ -422,13 +448,20 @@ void score_curve(const SequenceArrays& to, const LensNumbers& lens, const CurveL
   HWY_DYNAMIC_DISPATCH(ScoreCurve)(to, lens, line, own, curve);
 }
 
-int find_minima(const ScoredCurve& curve, std::int32_t limit, CurveMinimum* minima) {
-  return HWY_DYNAMIC_DISPATCH(FindMinima)(curve, limit, minima);
+void find_minima(const ScoredCurve& curve, std::int32_t limit, CurveMinima& minima) {
+  HWY_DYNAMIC_DISPATCH(FindMinima)(curve, limit, minima);
 }
 
 void improve_minima(const SequenceArrays& to, const ScoredCurve& curve, std::int32_t own_square, bool affine,
-                    std::span<CurveMinimum> minima) {
+                    CurveMinima& minima) {
   HWY_DYNAMIC_DISPATCH(ImproveMinima)(to, curve, own_square, affine, minima);
+}
+
+void CurveMinima::make_room(int entries) {
+  const std::size_t room = static_cast<std::size_t>(entries) / 2 + 1 + score_padding;  // whole vectors are written
+  if (place.size() >= room) return;
+  for (auto* values : {&place, &score, &beside, &beside_score}) values->resize(room);
+  for (auto* values : {&improved_place, &distance_squared}) values->resize(room);
 }
 
 float ScoredCurve::share_at(float place) const {

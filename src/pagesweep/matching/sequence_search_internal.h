@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -48,58 +49,46 @@ struct LineBatch {
 /// \param along_rows  see SequenceArrays
 void lay_lines(const CurveFrame& frame, bool along_rows, LineBatch& batch);
 
-/// A sequence that looks for its like.
-struct OwnSequence {
-  const std::int32_t* pairs;  ///< one behind the other
-  std::int32_t square;        ///< scalar product with itself
-};
-
 /// A curve's places in the other picture, one for each of a line's that it passes (or, where it does not run along the
 /// lines, one for each of the CurveLine's), and how unlike their sequences are.
 struct ScoredCurve {
-  /// Entries that are neighbours in the picture.
-  struct Run {
-    int begin, end;
-    std::int32_t pixel;  ///< of the first one
-  };
-
   int count = 0;
   std::int32_t least = 0;            ///< score
   float first = 0;                   ///< place that stands first; NaN if they are the CurveLine's
   std::vector<std::int32_t> scores;  ///< a highest one where the picture does not show it
-  std::vector<Run> runs;             ///< where it does
+  std::vector<std::int32_t> pixels;  ///< -1 there
   std::vector<float> nodes;          ///< places at even steps along the CurveLine, from its beginning to its end
   std::vector<float> across;         ///< lines at the nodes
 
   const std::int32_t* first_score() const { return scores.data() + score_padding; }
+  bool sees_anything() const { return least < std::numeric_limits<std::int32_t>::max(); }
   /// How far along the CurveLine an interpolated place is, from 0 to 1.
   float share_at(float place) const;
   /// The pixel of an entry, -1 if the picture does not show it.
-  std::int32_t pixel_at(int entry) const {
-    for (const Run& run : runs)
-      if (entry >= run.begin && entry < run.end) return run.pixel + (entry - run.begin);
-    return -1;
-  }
+  std::int32_t pixel_at(int entry) const { return pixels[static_cast<std::size_t>(score_padding + entry)]; }
 };
 
 /// Compares a sequence with those of the pixels nearest to a curve's places: sums of squared differences (eq. 1).
 void score_curve(const SequenceArrays& to, const LensNumbers& lens, const CurveLine& line, const OwnSequence& own,
                  ScoredCurve& curve);
 
-/// A place on a curve that may be the match.
-struct CurveMinimum {
-  float place;             ///< among those of the curve; once improved, a fraction
-  float distance_squared;  ///< there, of the nearest pixel; once improved, interpolated between the two nearest
+/// Places on a curve that may be the match, one entry each.
+struct CurveMinima {
+  int count = 0;
+  std::vector<std::int32_t> place, score;               ///< entries of the curve
+  std::vector<std::int32_t> beside, beside_score;       ///< the better one of their neighbours, which may be none
+  std::vector<float> improved_place, distance_squared;  ///< interpolated between both
+
+  /// \param entries  of the curve
+  void make_room(int entries);
 };
 
 /// The places whose scores are at most `limit`, lower than the one before and not higher than the one behind.
-/// \param minima  the lowest comes first; room for half of count, rounded up
-/// \return how many there are
-int find_minima(const ScoredCurve& curve, std::int32_t limit, CurveMinimum* minima);
+void find_minima(const ScoredCurve& curve, std::int32_t limit, CurveMinima& minima);
 
 /// Interpolates linearly towards the better one of each minimum's neighbours.
 /// \param affine  see Normalisation
 void improve_minima(const SequenceArrays& to, const ScoredCurve& curve, std::int32_t own_square, bool affine,
-                    std::span<CurveMinimum> minima);
+                    CurveMinima& minima);
 
 }  // namespace pagesweep

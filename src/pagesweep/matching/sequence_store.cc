@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <variant>
 
 #include "pagesweep/base/image.h"
 #include "pagesweep/base/parallel.h"
@@ -75,26 +77,14 @@ SequenceStore::SequenceStore(const Frames& frames, const std::vector<int>& insta
   });
 }
 
-void SequenceStore::store_rows(const Frames& frames, const std::vector<int>& instants, const MatchOptions& options,
-                               int begin, int end) {
-  const auto range = static_cast<float>(frames.sequence().saturation - frames.sequence().black_level);
-  const int width = frames.width(), pixels = std::min(pixels_at_once, width);
-  SampleReader reader(frames, instants);
-  for (int y = begin; y < end; ++y)
-    for (int left = 0; left < width; left += pixels_at_once) {
-      // The last pixels of a row are stored together with some that already are.
-      const int first = std::max(0, std::min(left, width - pixels_at_once));
-      store(first, y, {reader.read(y, first), pixels, range}, options);
-    }
-}
-
-void SequenceStore::store(int left, int y, const GrayRows& gray, const MatchOptions& options) {
+template <class Sample>
+void SequenceStore::store(int left, int y, const SampleRows<Sample>& gray, const MatchOptions& options) {
   alignas(64) std::array<float, pixels_at_once> energy, lowest, highest, scale;
   const bool affine = options.normalisation == Normalisation::affine;
   const auto darkest = static_cast<float>(options.min_modulation) * gray.range;
   const int line = arrays_.along_rows ? y : left, place = arrays_.along_rows ? left : y;
   const std::ptrdiff_t stride = arrays_.stride, pixel_step = arrays_.along_rows ? 1 : arrays_.pairs * stride;
-  pack_sequences(gray, affine, {sequence(line, place), stride, pixel_step},
+  pack_sequences(gray, affine, {pairs_at(line, place), stride, pixel_step},
                  {energy.data(), lowest.data(), highest.data(), scale.data()});
   for (std::size_t k = 0; k < static_cast<std::size_t>(gray.pixels); ++k) {
     const std::int32_t pixel = index(left + static_cast<int>(k), y);
@@ -109,17 +99,32 @@ void SequenceStore::store(int left, int y, const GrayRows& gray, const MatchOpti
   }
 }
 
-void SequenceStore::store_zeros(std::int32_t index) {
-  std::int32_t* pair = sequence(index / arrays_.stride, index % arrays_.stride);
-  for (int j = 0; j < arrays_.pairs; ++j, pair += arrays_.stride) *pair = 0;
+void SequenceStore::store_rows(const Frames& frames, const std::vector<int>& instants, const MatchOptions& options,
+                               int begin, int end) {
+  const Sequence& sequence = frames.sequence();
+  const auto black_level = static_cast<float>(sequence.black_level);
+  const auto range = static_cast<float>(sequence.saturation - sequence.black_level);
+  const int width = frames.width(), pixels = std::min(pixels_at_once, width);
+  const bool are_bytes = sequence.is_8_bit() && sequence.exposures.empty() && width >= pixels_at_once;
+  SampleReader reader(frames, instants);
+  std::vector<const std::uint8_t*> bytes(instants.size());
+  for (int y = begin; y < end; ++y)
+    for (int left = 0; left < width; left += pixels_at_once) {
+      // The last pixels of a row are stored together with some that already are.
+      const int first = std::max(0, std::min(left, width - pixels_at_once));
+      if (are_bytes) {
+        std::ranges::transform(instants, bytes.begin(),
+                               [&](int i) { return &std::get<Image<std::uint8_t>>(frames.frame(i))(first, y); });
+        store<std::uint8_t>(first, y, {bytes, pixels, range, black_level}, options);
+      } else {
+        store<float>(first, y, {reader.read(y, first), pixels, range}, options);
+      }
+    }
 }
 
-void SequenceStore::copy(std::int32_t index, std::span<std::int32_t> pairs) const {
-  const std::int32_t* pair = arrays_.sequence(index);
-  for (std::int32_t& out : pairs) {
-    out = *pair;
-    pair += arrays_.stride;
-  }
+void SequenceStore::store_zeros(std::int32_t index) {
+  std::int32_t* pair = pairs_at(index / arrays_.stride, index % arrays_.stride);
+  for (int j = 0; j < arrays_.pairs; ++j, pair += arrays_.stride) *pair = 0;
 }
 
 }  // namespace pagesweep

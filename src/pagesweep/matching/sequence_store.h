@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "pagesweep/data/frames.h"
@@ -30,10 +29,7 @@ class SequenceStore {
   const SequenceArrays& arrays() const { return arrays_; }
   /// Of a pixel, as all that follow take it.
   std::int32_t index(int x, int y) const { return arrays_.along_rows ? arrays_.index(y, x) : arrays_.index(x, y); }
-  /// Copies a sequence's pairs of samples one behind the other.
-  void copy(std::int32_t index, std::span<std::int32_t> pairs) const;
-  /// Scalar product of a sequence with itself.
-  std::int32_t square(std::int32_t index) const { return own_[at(index)]; }
+  OwnSequence sequence(std::int32_t index) const { return {arrays_.sequence(index), arrays_.stride, own_[at(index)]}; }
   /// Sum of squared deviations from the sequence's mean, in the store's own units.
   float energy(std::int32_t index) const { return energy_[at(index)]; }
   /// Variance of one stored sample that comes from rounding the gray values, in the store's own units.
@@ -60,9 +56,10 @@ class SequenceStore {
   static std::size_t at(std::int32_t index) { return static_cast<std::size_t>(index); }
   void store_rows(const Frames& frames, const std::vector<int>& instants, const MatchOptions& options, int begin,
                   int end);
-  void store(int left, int y, const GrayRows& gray, const MatchOptions& options);
+  template <class Sample>
+  void store(int left, int y, const SampleRows<Sample>& gray, const MatchOptions& options);
   void store_zeros(std::int32_t index);
-  std::int32_t* sequence(int line, int place) {
+  std::int32_t* pairs_at(int line, int place) {
     return pairs_[0].pairs + (arrays_.sequence(line, place) - arrays_.data);
   }
 

@@ -161,9 +161,16 @@ TwoWayMatching::TwoWayMatching(const RayTable& first, const RayTable& second, co
       second_(second),
       max_disagreement_px_(options.max_disagreement_px),
       allowed_(allowed_range(first.camera(), second.camera(), options)),
-      range_is_known_(options.near_mm > 0 && options.far_mm > 0),
-      pair_{Correspondences(first.width(), first.height()), Correspondences(second.width(), second.height())},
-      found_{pair_.from_first.status, pair_.from_second.status} {}
+      range_is_known_(options.near_mm > 0 && options.far_mm > 0) {
+  const RayTable* cameras[] = {&first, &second};
+  Correspondences* matches[] = {&pair_.from_first, &pair_.from_second};
+  Image<PixelStatus>* found[] = {&found_.first, &found_.second};
+  // Getting the memory takes as long as anything else does.
+  parallel_ranges(2, 1, [&](int k, int) {
+    *matches[k] = Correspondences(cameras[k]->width(), cameras[k]->height());
+    *found[k] = matches[k]->status;
+  });
+}
 
 void TwoWayMatching::match(const PixelMatcher& from_first, const PixelMatcher& from_second, Progress& progress) {
   const Direction there{&first_, &second_, &from_first}, back{&second_, &first_, &from_second};
@@ -184,11 +191,13 @@ void TwoWayMatching::match(const PixelMatcher& from_first, const PixelMatcher& f
 
 MatchPair TwoWayMatching::matches() && {
   for (Correspondences* matches : {&pair_.from_first, &pair_.from_second})
-    for (std::size_t i = 0; i < matches->status.size(); ++i) {
-      if (matches->status.data()[i] == PixelStatus::ok) continue;
-      matches->u.data()[i] = matches->v.data()[i] = not_a_number;
-      matches->sigma.data()[i] = matches->slope.data()[i] = not_a_number;
-    }
+    parallel_rows(matches->height(), [&](int y) {
+      for (int x = 0; x < matches->width(); ++x) {
+        if (matches->status(x, y) == PixelStatus::ok) continue;
+        matches->u(x, y) = matches->v(x, y) = not_a_number;
+        matches->sigma(x, y) = matches->slope(x, y) = not_a_number;
+      }
+    });
   return std::move(pair_);
 }
 
