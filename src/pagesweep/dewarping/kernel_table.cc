@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <type_traits>
 #include <vector>
 
 #include "pagesweep/dewarping/kernel_table_internal.h"
@@ -68,6 +69,8 @@ KernelTable<Weight>::KernelTable(ResampleKernel kernel, double width, const Lane
       chunks_((taps_ * layout.channels + layout.used() - 1) / layout.used()),
       shift_(std::min(most_shared_bits, static_cast<int>(std::log2(width)))),
       down_(taps_, phases_per_px >> shift_),
+      down_spread_(std::is_same_v<Weight, std::int16_t> && layout.channels == 1 ? taps_ * layout.lanes : 0,
+                   phases_per_px >> shift_),
       across_(chunks_ * layout.lanes, phases_per_px >> shift_) {
   std::vector<float> weights(static_cast<std::size_t>(taps_));
   for (int row = 0; row < down_.height(); ++row) {
@@ -76,6 +79,7 @@ KernelTable<Weight>::KernelTable(ResampleKernel kernel, double width, const Lane
     store(weights, down_.row(row).data());
     for (int k = 0; k < taps_ * layout.channels; ++k)
       across_(k / layout.used() * layout.lanes + k % layout.used(), row) = down_(k / layout.channels, row);
+    for (int k = 0; k < down_spread_.width(); ++k) down_spread_(k, row) = down_(k / layout.lanes, row);
   }
 }
 

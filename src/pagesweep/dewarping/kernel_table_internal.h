@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -36,6 +37,17 @@ struct LaneLayout {
   int used() const { return pixels * channels; }  ///< the lanes beyond weigh nothing
 };
 
+/// One table of weights.
+template <class Weight>
+struct KernelRows {
+  const Weight* first;
+  std::ptrdiff_t stride;
+  int shift;  ///< a wide kernel changes little from one phase to the next: 2^shift of them share a row
+
+  /// \param phase  0 to phases_per_px - 1
+  const Weight* operator[](int phase) const { return first + (phase >> shift) * stride; }
+};
+
 /// The weights of one kernel width for all fractions of a pixel.
 /// \tparam Weight  float, or std::int16_t: in units of 2^-15, a single 1 being 1 - 2^-15
 template <class Weight>
@@ -45,15 +57,19 @@ class KernelTable {
 
   int taps() const { return taps_; }
   int chunks() const { return chunks_; }  ///< of layout.used() samples, that hold all taps
-  /// One weight a tap. \param phase  0 to phases_per_px - 1
-  const Weight* down(int phase) const { return &down_(0, phase >> shift_); }
-  /// The same for each channel of all taps, in chunks of `lanes`.
-  const Weight* across(int phase) const { return &across_(0, phase >> shift_); }
+  /// One weight a tap.
+  KernelRows<Weight> down() const { return rows_of(down_); }
+  /// In fixed point for gray pixels: each weight as often as a chunk has lanes, so that whole vectors are multiplied.
+  KernelRows<Weight> down_spread() const { return rows_of(down_spread_); }
+  /// The same as down() for each channel of all taps, in chunks of `lanes`.
+  KernelRows<Weight> across() const { return rows_of(across_); }
 
  private:
+  KernelRows<Weight> rows_of(const Image<Weight>& table) const { return {table.data(), table.width(), shift_}; }
+
   int taps_, chunks_;
-  int shift_;  ///< a wide kernel changes little from one phase to the next: 2^shift of them share a row
-  Image<Weight> down_, across_;
+  int shift_;  ///< see KernelRows
+  Image<Weight> down_, down_spread_, across_;
 };
 
 /// Tables of all widths, each made when it is first asked for, by whatever thread.

@@ -49,8 +49,8 @@ T to_sample(float value) {
 template <class T>
 void sum_at_border(const ResampleRun<T, float>& run, int width, int height, int k) {
   const int taps_u = run.across->taps(), taps_v = run.down->taps();
-  const float* weights_u = run.across->down(run.u[k] & (phases_per_px - 1));
-  const float* weights_v = run.down->down(run.v[k] & (phases_per_px - 1));
+  const float* weights_u = run.across->down()[run.u[k] & (phases_per_px - 1)];
+  const float* weights_v = run.down->down()[run.v[k] & (phases_per_px - 1)];
   float sums[3] = {};
   for (int j = 0; j < taps_v; ++j)
     for (int i = 0; i < taps_u; ++i) {
@@ -79,6 +79,7 @@ class Resampler {
     look_up(map_, x, y, count, scan_.width() / channels_, scan_.height(), lookups);
     for (int begin = 0, end = 0; begin < count; begin = end) {
       const int width_u = lookups.width_u[begin], width_v = lookups.width_v[begin];
+      if (lookups.alike) end = count;
       while (end < count && lookups.width_u[end] == width_u && lookups.width_v[end] == width_v) ++end;
       T* pixels = out + static_cast<std::ptrdiff_t>(x + begin) * channels_;
       if (width_u == Lookups::hidden)
@@ -113,16 +114,20 @@ class Resampler {
     const int taps_u = taps_of(options_.kernel, width_of(lookups.width_u[begin]));
     const int taps_v = taps_of(options_.kernel, width_of(lookups.width_v[begin]));
     constexpr int overread = 32;  // the most lanes that a vector has: the same on all processors
-    const auto is_inside = [&](int k) {
-      const int u = (lookups.u[k] >> phase_bits) + first_tap(taps_u);
-      const int v = (lookups.v[k] >> phase_bits) + first_tap(taps_v);
+    const auto is_place_inside = [&](std::int32_t position_u, std::int32_t position_v) {
+      const int u = (position_u >> phase_bits) + first_tap(taps_u);
+      const int v = (position_v >> phase_bits) + first_tap(taps_v);
       // What is read beyond the last tap is the next row, or the one after, but must not lie beyond the picture.
       const std::int64_t last = std::int64_t{v + taps_v - 1} * width + u + taps_u;
       return u >= 0 && v >= 0 && u + taps_u <= width && v + taps_v <= scan_.height() &&
              last + overread <= std::int64_t{width} * scan_.height();
     };
+    const auto is_inside = [&](int k) { return is_place_inside(lookups.u[k], lookups.v[k]); };
+    const bool all_inside =
+        is_place_inside(lookups.low_u, lookups.low_v) && is_place_inside(lookups.high_u, lookups.high_v);
     for (int k = begin, next = begin; k < end; k = next) {
-      const bool inside = is_inside(k);
+      const bool inside = all_inside || is_inside(k);
+      if (all_inside) next = end;
       while (next < end && is_inside(next) == inside) ++next;
       T* pixels = out + static_cast<std::ptrdiff_t>(k - begin) * channels_;
       if (!inside) {

@@ -59,15 +59,30 @@ void look_up_axis(const Image<float>& map, int x, int y, int count, int scan_siz
   }
 }
 
+void find_bounds(const std::int32_t* position, int count, std::int32_t& low, std::int32_t& high) {
+  std::int32_t least = position[0], most = position[0];
+  for (int k = 1; k < count; ++k) {
+    least = position[k] < least ? position[k] : least;
+    most = position[k] > most ? position[k] : most;
+  }
+  low = least;
+  high = most;
+}
+
 void LookUp(const ScanMap& map, int x, int y, int count, int scan_width, int scan_height, Lookups& out) {
   out.count = count;
   look_up_axis(map.u, x, y, count, scan_width, out.u, out.width_u);
   look_up_axis(map.v, x, y, count, scan_height, out.v, out.width_v);
+  std::int32_t unlike = 0;
   for (int k = 0; k < count; ++k) {
     const bool hidden = (out.width_u[k] == Lookups::hidden) | (out.width_v[k] == Lookups::hidden);
     out.width_u[k] = hidden ? Lookups::hidden : out.width_u[k];
     out.width_v[k] = hidden ? Lookups::hidden : out.width_v[k];
+    unlike |= (out.width_u[k] ^ out.width_u[0]) | (out.width_v[k] ^ out.width_v[0]);
   }
+  out.alike = unlike == 0;
+  find_bounds(out.u, count, out.low_u, out.high_u);
+  find_bounds(out.v, count, out.low_v, out.high_v);
 }
 
 // ---- the sum: samples of one row and all channels are neighbours, and so they stand in a vector
@@ -75,6 +90,13 @@ void LookUp(const ScanMap& map, int x, int y, int count, int scan_width, int sca
 /// Lanes of the sums. A gray pixel's few taps would leave a long vector empty.
 template <class Weight, int Channels>
 using SumTag = std::conditional_t<Channels == 1, hn::CappedTag<Weight, 8>, hn::ScalableTag<Weight>>;
+
+/// Whether gray sums in float are taken over the same tap of neighbouring pixels, which needs vectors of known length.
+#if HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
+constexpr bool sums_gray_by_taps = true;
+#else
+constexpr bool sums_gray_by_taps = false;
+#endif
 
 /// Rounding depends on the order of a sum. Gray pixels are added up in the order of those in colour, so that a gray
 /// picture comes out the same whichever way it is stored. Sums in fixed point are exact.
@@ -85,7 +107,8 @@ LaneLayout layout_of(int channels) {
   // Without vectors there is one lane, and a pixel's channels come one after the other.
   const int colour_pixels = std::max(1, colour_lanes / 3);
   if (channels == 3) return {std::max(3, colour_lanes), 3, colour_pixels};
-  return {gray_lanes, 1, std::is_same_v<Weight, float> ? std::min(gray_lanes, colour_pixels) : gray_lanes};
+  const bool in_order_of_colour = std::is_same_v<Weight, float> && !sums_gray_by_taps;
+  return {gray_lanes, 1, in_order_of_colour ? std::min(gray_lanes, colour_pixels) : gray_lanes};
 }
 
 /// Fixed point: samples and sums have 6 binary places.
@@ -108,26 +131,95 @@ V add_weighted(D, V sum, V value, V weight) {
   return hn::MulAdd(value, weight, sum);
 }
 
-/// Sums over all rows and, lane by lane, over chunks of columns. \return  as many as the layout has lanes
-template <class D, class T, class Weight>
-HWY_INLINE void sum_pixel(D d, const ResampleRun<T, Weight>& run, const LaneLayout& layout, int k, Weight* sums) {
-  const int taps_v = run.down->taps();
-  const int x = (run.u[k] >> phase_bits) + first_tap(run.across->taps());
-  const int y = (run.v[k] >> phase_bits) + first_tap(taps_v);
-  const T* corner = run.scan + y * run.stride + static_cast<std::ptrdiff_t>(x) * run.channels;
-  const Weight* down = run.down->down(run.v[k] & (phases_per_px - 1));
-  const Weight* across = run.across->across(run.u[k] & (phases_per_px - 1));
-  for (int lane = 0; lane < layout.lanes; lane += static_cast<int>(hn::Lanes(d))) {
-    auto sum = hn::Zero(d);
-    for (int chunk = 0; chunk < run.across->chunks(); ++chunk) {
-      const T* row = corner + chunk * layout.used() + lane;
-      auto column = hn::Zero(d);
-      for (int j = 0; j < taps_v; ++j, row += run.stride)
-        column = add_weighted(d, column, load_samples(d, row), hn::Set(d, down[j]));
-      sum = add_weighted(d, sum, column, hn::Load(d, across + chunk * layout.lanes + lane));
-    }
-    hn::Store(sum, d, sums + lane);
+/// Where pixels look in the scan, and their weights: what does not change from one pixel of a run to the next.
+template <class T, class Weight>
+struct Places {
+  Places(const ResampleRun<T, Weight>& run, KernelRows<Weight> down_table)
+      : stride(run.stride),
+        channels(run.channels),
+        scan(run.scan + first_tap(run.down->taps()) * stride +
+             std::ptrdiff_t{first_tap(run.across->taps())} * channels),
+        u(run.u),
+        v(run.v),
+        down(down_table),
+        across(run.across->across()) {}
+
+  const T* corner(int k) const {
+    return scan + (v[k] >> phase_bits) * stride + std::ptrdiff_t{u[k] >> phase_bits} * channels;
   }
+  const Weight* down_at(int k) const { return down[v[k] & (phases_per_px - 1)]; }
+  const Weight* across_at(int k) const { return across[u[k] & (phases_per_px - 1)]; }
+
+  const std::ptrdiff_t stride, channels;
+  const T* const scan;
+  const std::int32_t *const u, *const v;
+  const KernelRows<Weight> down, across;
+};
+
+/// Sums over all rows and, lane by lane, over chunks of columns: as many as the layout has lanes, for each pixel.
+/// \tparam taps_down  0: as many as the kernel has
+template <int taps_down, class D, class T, class Weight>
+void sum_lanes(D d, const ResampleRun<T, Weight>& run, const LaneLayout& layout, Weight* sums) {
+  const Places places(run, run.down->down());
+  const int taps_v = taps_down > 0 ? taps_down : run.down->taps();
+  const int count = run.count, chunks = run.across->chunks(), lanes = layout.lanes, used = layout.used();
+  for (int k = 0; k < count; ++k, sums += lanes)
+    for (int lane = 0; lane < lanes; lane += static_cast<int>(hn::Lanes(d))) {
+      const T* corner = places.corner(k) + lane;
+      const Weight *down = places.down_at(k), *across = places.across_at(k) + lane;
+      auto sum = hn::Zero(d);
+      for (int chunk = 0; chunk < chunks; ++chunk) {
+        const T* row = corner + chunk * used;
+        auto column = hn::Zero(d);
+        for (int j = 0; j < taps_v; ++j, row += places.stride)
+          column = add_weighted(d, column, load_samples(d, row), hn::Set(d, down[j]));
+        sum = add_weighted(d, sum, column, hn::Load(d, across + chunk * lanes));
+      }
+      hn::Store(sum, d, sums + lane);
+    }
+}
+
+#if HWY_CAP_GE256 && !HWY_HAVE_SCALABLE
+/// The same for gray pixels in fixed point: two rows of the scan in one vector.
+/// \tparam taps_down  0: as many as the kernel has, an even number
+template <int taps_down>
+void sum_gray_lanes(const ResampleRun<std::uint8_t, std::int16_t>& run, std::int16_t* sums) {
+  const hn::Full256<std::int16_t> two_rows;
+  const hn::Full128<std::int16_t> d;
+  const hn::Full128<std::uint8_t> bytes;
+  const hn::Full64<std::uint8_t> row_bytes;
+  constexpr int lanes = 8;
+  const Places places(run, run.down->down_spread());
+  const int count = run.count, chunks = run.across->chunks(), taps_v = taps_down > 0 ? taps_down : run.down->taps();
+  for (int k = 0; k < count; ++k) {
+    const std::uint8_t* corner = places.corner(k);
+    const std::int16_t *down = places.down_at(k), *across = places.across_at(k);
+    auto sum = hn::Zero(d);
+    for (int chunk = 0; chunk < chunks; ++chunk) {
+      const std::uint8_t* row = corner + chunk * lanes;
+      auto columns = hn::Zero(two_rows);
+      for (int j = 0; j < taps_v; j += 2, row += 2 * places.stride) {
+        const auto samples = hn::Combine(bytes, hn::LoadU(row_bytes, row + places.stride), hn::LoadU(row_bytes, row));
+        const auto values = hn::ShiftLeft<6>(hn::PromoteTo(two_rows, samples));
+        columns = add_weighted(two_rows, columns, values, hn::LoadU(two_rows, down + j * lanes));
+      }
+      const auto column = hn::Add(hn::LowerHalf(d, columns), hn::UpperHalf(d, columns));
+      sum = add_weighted(d, sum, column, hn::LoadU(d, across + chunk * lanes));
+    }
+    hn::StoreU(sum, d, sums + k * lanes);
+  }
+}
+#endif
+
+/// Either, with the loops unrolled for Lanczos' six taps.
+template <class D, class T, class Weight>
+void sum_pixels(D d, const ResampleRun<T, Weight>& run, const LaneLayout& layout, Weight* sums) {
+  const bool six_taps = run.down->taps() == 6;
+#if HWY_CAP_GE256 && !HWY_HAVE_SCALABLE
+  if constexpr (std::is_same_v<Weight, std::int16_t>)
+    if (run.channels == 1) return six_taps ? sum_gray_lanes<6>(run, sums) : sum_gray_lanes<0>(run, sums);
+#endif
+  six_taps ? sum_lanes<6>(d, run, layout, sums) : sum_lanes<0>(d, run, layout, sums);
 }
 
 /// Adds up the lanes of each channel. Going through memory costs least.
@@ -192,6 +284,85 @@ void store_samples(const std::int16_t* sums, int count, std::uint8_t* out) {
   }
 }
 
+#if HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
+/// Columns of gray samples, or their weights, of as many pixels as a vector has lanes, in blocks of four taps.
+template <class D>
+struct TapBlocks {
+  static constexpr int pixels = static_cast<int>(hn::MaxLanes(D()));
+  static constexpr int most_taps = 2 * 3 * static_cast<int>(largest_width);
+  alignas(64) float values[most_taps / 4 * pixels * 4];
+
+  void store(hn::Vec<D> taps, int first_tap, int pixel) {
+    const hn::Full128<float> four;
+    float* out = values + first_tap * pixels + 4 * pixel;
+    if constexpr (pixels == 4) {
+      hn::Store(taps, four, out);
+    } else {
+      hn::Store(hn::LowerHalf(four, taps), four, out);
+      hn::Store(hn::UpperHalf(four, taps), four, out + 4 * pixels);
+    }
+  }
+};
+
+/// Sums of gray pixels in float, as many as a vector has lanes. The order is that of colour, where every so-many-th tap
+/// goes into the same partial sum.
+/// \tparam taps  along both axes; 0: as many as the kernel has
+template <int taps, class D, class T>
+HWY_INLINE hn::Vec<D> sum_gray_vector(D d, const ResampleRun<T, float>& run, const Places<T, float>& places,
+                                      int first) {
+  constexpr int lanes = TapBlocks<D>::pixels;
+  constexpr int parts = std::max(1, static_cast<int>(hn::MaxLanes(SumTag<float, 3>())) / 3);
+  TapBlocks<D> columns, weights;
+  const int taps_u = taps > 0 ? taps : run.across->taps(), taps_v = taps > 0 ? taps : run.down->taps();
+  for (int pixel = 0; pixel < lanes; ++pixel) {
+    const int k = std::min(first + pixel, run.count - 1);
+    const T* corner = places.corner(k);
+    const float *down = places.down_at(k), *across = places.across_at(k);
+    for (int tap = 0; tap < taps_u; tap += lanes) {
+      const T* row = corner + tap;
+      auto column = hn::Zero(d);
+      for (int j = 0; j < taps_v; ++j, row += places.stride)
+        column = add_weighted(d, column, load_samples(d, row), hn::Set(d, down[j]));
+      columns.store(column, tap, pixel);
+      weights.store(hn::LoadU(d, across + tap), tap, pixel);
+    }
+  }
+  hn::Vec<D> sums[parts];
+  std::fill_n(sums, parts, hn::Zero(d));
+  for (int tap = 0; tap < taps_u; tap += 4) {
+    hn::Vec<D> c[4], w[4];
+    hn::LoadInterleaved4(d, columns.values + tap * lanes, c[0], c[1], c[2], c[3]);
+    hn::LoadInterleaved4(d, weights.values + tap * lanes, w[0], w[1], w[2], w[3]);
+    for (int k = 0; k < std::min(4, taps_u - tap); ++k) {
+      hn::Vec<D>& sum = sums[(tap + k) % parts];
+      sum = hn::MulAdd(c[k], w[k], sum);
+    }
+  }
+  for (int k = 1; k < std::min(parts, taps_u); ++k) sums[0] = hn::Add(sums[0], sums[k]);
+  return sums[0];
+}
+
+template <int taps, class D, class T>
+void sum_gray_vectors(D d, const ResampleRun<T, float>& run, float* sums) {
+  const Places places(run, run.down->down());
+  for (int k = 0; k < run.count; k += TapBlocks<D>::pixels)
+    hn::StoreU(sum_gray_vector<taps>(d, run, places, k), d, sums + k);
+}
+
+/// Gray pixels in float.
+template <class T>
+void sum_gray_run(const ResampleRun<T, float>& run) {
+  const SumTag<float, 1> d;
+  constexpr std::size_t slack = hn::MaxLanes(hn::ScalableTag<float>());  // written, but not meant
+  alignas(64) float sums[Lookups::most + slack];
+  alignas(64) T samples[Lookups::most + slack];
+  const bool six_taps = run.down->taps() == 6 && run.across->taps() == 6;
+  six_taps ? sum_gray_vectors<6>(d, run, sums) : sum_gray_vectors<0>(d, run, sums);
+  store_samples(sums, run.count, samples);
+  std::copy_n(samples, run.count, run.out);
+}
+#endif
+
 template <int Channels, class T, class Weight>
 void sum_run(const ResampleRun<T, Weight>& run) {
   const SumTag<Weight, Channels> d;
@@ -200,7 +371,7 @@ void sum_run(const ResampleRun<T, Weight>& run) {
   alignas(64) Weight lanes[Lookups::most * std::max<std::size_t>(hn::MaxLanes(d), Channels) + slack];
   alignas(64) Weight sums[Lookups::most * Channels + slack];
   alignas(64) T samples[Lookups::most * Channels + slack];
-  for (int k = 0; k < run.count; ++k) sum_pixel(d, run, layout, k, lanes + k * layout.lanes);
+  sum_pixels(d, run, layout, lanes);
   const int pixels = std::min(run.across->taps(), layout.pixels);
   add_all_lanes<Channels>(lanes, layout, pixels, run.count, sums);
   store_samples(sums, run.count * Channels, samples);
@@ -209,7 +380,11 @@ void sum_run(const ResampleRun<T, Weight>& run) {
 
 template <class T, class Weight>
 void sum_any(const ResampleRun<T, Weight>& run) {
-  run.channels == 1 ? sum_run<1>(run) : sum_run<3>(run);
+  if (run.channels == 3) return sum_run<3>(run);
+#if HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
+  if constexpr (std::is_same_v<Weight, float>) return sum_gray_run(run);
+#endif
+  sum_run<1>(run);
 }
 
 void RunBytes(const ResampleRun<std::uint8_t, std::int16_t>& run) { sum_any(run); }

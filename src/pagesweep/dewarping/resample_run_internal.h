@@ -17,6 +17,8 @@ struct Lookups {
   int count = 0;
   alignas(64) std::int32_t u[most], v[most];              ///< [1 / phases_per_px px]; undefined where hidden
   alignas(64) std::int32_t width_u[most], width_v[most];  ///< index of the kernel's width; `hidden` in both, or none
+  bool alike = false;                                     ///< whether the widths of all pixels are the same
+  std::int32_t low_u, high_u, low_v, high_v;              ///< bounds of all u and v
 };
 
 /// Looks up page pixels (x ... x + count - 1, y), at most Lookups::most.

@@ -141,6 +141,25 @@ TEST(Resample, EightAndSixteenBitGrayAndColourAgreeWithinRounding) {
     }
 }
 
+TEST(Resample, GrayIsColourOnEveryInstructionSet) {
+  on_every_instruction_set([] {
+    for (const int bits : {8, 16})
+      for (const auto kernel : {ResampleKernel::catmull_rom, ResampleKernel::lanczos3})
+        for (const double scale : {0.97, 1.3, 2.9}) {
+          const Picture gray = random_picture(137, 61, 1, bits);
+          Picture colour = make_picture(137, 61, 3, bits);
+          for (int y = 0; y < 61; ++y)
+            for (int x = 0; x < 137; ++x) set_pixel(colour, x, y, pixel_at(gray, x, y));
+          const ScanMap map = make_map(43, 19, 0.2, -0.1, scale, 0.03, -0.02, scale);
+          const Picture from_gray = resample(gray, map, 1, {.kernel = kernel});
+          const Picture from_colour = resample(colour, map, 1, {.kernel = kernel});
+          for (int y = 0; y < 19; ++y)
+            for (int x = 0; x < 43; ++x)
+              ASSERT_EQ(pixel_at(from_gray, x, y), pixel_at(from_colour, x, y)) << bits << " " << scale;
+        }
+  });
+}
+
 TEST(Resample, HiddenPixelsAreFilledAndOvershootIsClipped) {
   Picture scan = make_picture(40, 40, 1, 8);
   for (int y = 0; y < 40; ++y)
