@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/dewarping/flat_preview_internal.h"
@@ -23,12 +25,19 @@ bool is_measured(const PageSurface& surface, double s_mm, double t_mm) {
 template <class Choose>
 Image<float> filter_rows(const Image<float>& in, int radius, const Choose& choose) {
   Image<float> out(in.width(), in.height());
-  parallel_rows(in.height(), [&](int y) {
-    for (int x = 0; x < in.width(); ++x) {
-      float value = in(x, y);
-      for (int k = std::max(0, x - radius); k <= std::min(in.width() - 1, x + radius); ++k)
-        value = choose(value, in(k, y));
-      out(x, y) = value;
+  const auto width = static_cast<std::size_t>(in.width());
+  const auto reach = static_cast<std::size_t>(radius);
+  parallel_ranges(in.height(), 16, [&](int begin, int end) {
+    std::vector<float> padded(width + 2 * reach);
+    for (int y = begin; y < end; ++y) {
+      const std::span<const float> row = in.row(y);
+      std::fill_n(padded.begin(), reach, row.front());
+      std::ranges::copy(row, padded.begin() + radius);
+      std::fill_n(padded.end() - radius, reach, row.back());
+      const std::span<float> chosen = out.row(y);
+      std::copy_n(padded.begin(), width, chosen.begin());
+      for (std::size_t k = 1; k <= 2 * reach; ++k)
+        for (std::size_t x = 0; x < width; ++x) chosen[x] = choose(chosen[x], padded[x + k]);
     }
   });
   return out;
@@ -99,8 +108,8 @@ Image<float> close_dark_spots(const Image<float>& brightness, int radius) {
   Image<float> known = brightness;
   for (float& value : known.pixels())
     if (std::isnan(value)) value = 0;
-  const auto larger = [](float a, float b) { return std::max(a, b); };
-  const auto smaller = [](float a, float b) { return std::min(a, b); };
+  const auto larger = [](float a, float b) { return a < b ? b : a; };
+  const auto smaller = [](float a, float b) { return b < a ? b : a; };
   return filter_squares(filter_squares(known, radius, larger), radius, smaller);
 }
 

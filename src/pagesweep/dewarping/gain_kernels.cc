@@ -25,15 +25,25 @@ void SpreadRow(std::span<const std::vector<float>> nodes, float nodes_per_px, st
                float* gains) {
   const Tag d;
   const hn::RebindToSigned<Tag> di;
-  const auto last = hn::Set(di, static_cast<std::int32_t>(nodes[0].size()) - 2);
+  const auto last_node = static_cast<std::int32_t>(nodes[0].size()) - 2;
+  const auto last = hn::Set(di, last_node);
+  // Where a vector of pixels lies between as many nodes, these are loaded as a vector, too.
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  const bool are_near = nodes_per_px * static_cast<float>(lanes) <= static_cast<float>(lanes - 1);
   for (std::size_t x = 0; x < shown.size(); x += hn::Lanes(d)) {
     const Vec u = hn::Mul(hn::Iota(d, static_cast<float>(x) + 0.5f), hn::Set(d, nodes_per_px));
     const auto i = hn::Min(hn::ConvertTo(di, u), last);
     const Vec a = hn::Sub(u, hn::ConvertTo(d, i));
     const auto hidden = hn::IsNaN(hn::LoadU(d, &shown[x]));
+    const int first = hn::GetLane(i);
+    const bool by_lanes = are_near && first + lanes <= last_node + 1;
+    const auto lane = hn::IndicesFromVec(d, by_lanes ? hn::Sub(i, hn::Set(di, first)) : hn::Zero(di));
     std::array<Vec, channels> gain;
     for (std::size_t c = 0; c < channels; ++c) {
-      const Vec left = hn::GatherIndex(d, nodes[c].data(), i), right = hn::GatherIndex(d, nodes[c].data() + 1, i);
+      const float* node = nodes[c].data();
+      const Vec left = by_lanes ? hn::TableLookupLanes(hn::LoadU(d, node + first), lane) : hn::GatherIndex(d, node, i);
+      const Vec right =
+          by_lanes ? hn::TableLookupLanes(hn::LoadU(d, node + first + 1), lane) : hn::GatherIndex(d, node + 1, i);
       gain[c] = hn::IfThenElse(hidden, hn::Set(d, left_alone), hn::MulAdd(a, hn::Sub(right, left), left));
     }
     if constexpr (channels == 3)
@@ -115,9 +125,15 @@ void ByteTones::multiply_light(std::span<const float> gains, std::span<std::uint
   const float steps_per_gain = steps_per_gain_, offset = 1.5f - first_ * steps_per_gain_;
   const int columns = shown_.width(), last = columns - 1;
   const std::uint8_t* shown = shown_.data();
-  for (std::size_t k = 0; k < samples.size(); ++k) {
-    const int step = std::clamp(static_cast<int>(gains[k] * steps_per_gain + offset), 0, last);
-    samples[k] = shown[samples[k] * columns + step];
+  constexpr std::size_t block = 64;
+  for (std::size_t k = 0; k < samples.size(); k += block) {
+    const std::size_t count = std::min(block, samples.size() - k);
+    std::array<int, block> steps;
+    for (std::size_t i = 0; i < count; ++i) {
+      const int step = static_cast<int>(gains[k + i] * steps_per_gain + offset);
+      steps[i] = step < 0 ? 0 : step > last ? last : step;
+    }
+    for (std::size_t i = 0; i < count; ++i) samples[k + i] = shown[samples[k + i] * columns + steps[i]];
   }
 }
 

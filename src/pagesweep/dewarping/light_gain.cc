@@ -17,7 +17,10 @@ constexpr int rows_at_once = 32;
 struct WordTones {
   ToneTables tones;
   void multiply_light(std::span<const float> gains, std::span<std::uint16_t> samples) const {
-    pagesweep::multiply_light(tones, gains, samples);
+    std::vector<std::uint16_t> whole_steps(gains.size());
+    std::ranges::copy(samples, whole_steps.begin());
+    pagesweep::multiply_light(tones, gains, whole_steps);
+    std::copy_n(whole_steps.begin(), samples.size(), samples.begin());
   }
 };
 
@@ -37,16 +40,13 @@ class RowGainer {
         (static_cast<std::size_t>(shown.width()) + gain_row_step - 1) / gain_row_step * gain_row_step;
     shown_row_.resize(pixels, 0.0f);
     gains_.resize(pixels * nodes_.size());
-    row_.resize(pixels * nodes_.size());
   }
 
   void apply(int y) {
     cut_grid((static_cast<float>(y) + 0.5f) * nodes_per_px_);
     std::ranges::copy(shown_.row(y), shown_row_.begin());
     spread_gains(nodes_, nodes_per_px_, shown_row_, gains_);
-    std::ranges::copy(samples_.row(y), row_.begin());
-    tones_.multiply_light(gains_, row_);
-    std::copy_n(row_.begin(), samples_.width(), samples_.row(y).begin());
+    tones_.multiply_light(gains_, samples_.row(y));
   }
 
  private:
@@ -69,7 +69,6 @@ class RowGainer {
   float nodes_per_px_;
   std::vector<std::vector<float>> nodes_;  ///< of each channel
   std::vector<float> shown_row_, gains_;
-  std::vector<T> row_;
 };
 
 template <class T, class Tones>

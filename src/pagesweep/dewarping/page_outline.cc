@@ -10,6 +10,7 @@
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/dewarping/edge_line_internal.h"
 #include "pagesweep/dewarping/flat_preview_internal.h"
+#include "pagesweep/dewarping/page_pieces_internal.h"
 #include "pagesweep/dewarping/text_direction_internal.h"
 
 namespace pagesweep {
@@ -57,15 +58,18 @@ double quantile(std::vector<float> values, double share) {
 
 /// Blank paper: nearly the brightest of what was measured (of all, if nothing was).
 double paper_brightness(const FlatPreview& preview, const Image<float>& levels) {
-  std::vector<float> measured, all;
-  for (int y = 0; y < preview.height(); ++y)
-    for (int x = 0; x < preview.width(); ++x) {
-      if (std::isnan(preview.brightness(x, y))) continue;
-      all.push_back(levels(x, y));
-      if (preview.measured(x, y)) measured.push_back(levels(x, y));
-    }
-  if (all.empty()) throw no_result("the scan shows no part of the page: does the rig's scanner belong to this scan?");
-  return quantile(measured.empty() ? all : measured, 0.85);
+  const auto shown = [&](bool measured) {
+    std::vector<float> values;
+    for (std::size_t k = 0; k < levels.size(); ++k)
+      if (!std::isnan(preview.brightness.data()[k]) && (!measured || preview.measured.data()[k]))
+        values.push_back(levels.data()[k]);
+    return values;
+  };
+  std::vector<float> values = shown(true);
+  if (values.empty()) values = shown(false);
+  if (values.empty())
+    throw no_result("the scan shows no part of the page: does the rig's scanner belong to this scan?");
+  return quantile(std::move(values), 0.85);
 }
 
 /// The table at one side: the typical brightness of the outermost 2 mm that the scan shows, as far as that is darker
@@ -89,41 +93,10 @@ std::optional<double> table_brightness(const SideOfPreview& side, const Image<fl
 /// Cells that belong to the page: brighter than the threshold, and in one piece with much of it or mostly measured. A
 /// ruler or colour target beside the page is neither.
 Image<char> find_paper(const FlatPreview& preview, const Image<float>& cells, double threshold) {
-  constexpr char unknown = 1;
-  Image<char> paper(preview.width(), preview.height(), false);
-  for (int y = 0; y < preview.height(); ++y)
-    for (int x = 0; x < preview.width(); ++x)
-      if (cells(x, y) > threshold && !std::isnan(preview.brightness(x, y))) paper(x, y) = unknown;
-  struct Piece {
-    std::vector<std::pair<int, int>> cells;
-    std::size_t measured = 0;
-  };
-  std::vector<Piece> pieces;
-  for (int y = 0; y < paper.height(); ++y)
-    for (int x = 0; x < paper.width(); ++x) {
-      if (!paper(x, y)) continue;
-      Piece piece{{{x, y}}};
-      paper(x, y) = false;
-      for (std::size_t k = 0; k < piece.cells.size(); ++k) {
-        const auto [cx, cy] = piece.cells[k];
-        piece.measured += preview.measured(cx, cy) != 0;
-        for (const auto& [nx, ny] : {std::pair{cx + 1, cy}, {cx - 1, cy}, {cx, cy + 1}, {cx, cy - 1}})
-          if (paper.contains(nx, ny) && paper(nx, ny)) {
-            paper(nx, ny) = false;
-            piece.cells.emplace_back(nx, ny);
-          }
-      }
-      pieces.push_back(std::move(piece));
-    }
-  std::size_t largest = 0;
-  // Of other sheets beside the page nothing was measured for this one.
-  if (std::ranges::any_of(pieces, [](const Piece& piece) { return piece.measured > 0; }))
-    std::erase_if(pieces, [](const Piece& piece) { return piece.measured == 0; });
-  for (const Piece& piece : pieces) largest = std::max(largest, piece.cells.size());
-  for (const Piece& piece : pieces)
-    if (10 * piece.cells.size() > largest || 2 * piece.measured > piece.cells.size())
-      for (const auto& [x, y] : piece.cells) paper(x, y) = true;
-  return paper;
+  Image<char> bright(preview.width(), preview.height());
+  for (std::size_t k = 0; k < bright.size(); ++k)
+    bright.data()[k] = cells.data()[k] > threshold && !std::isnan(preview.brightness.data()[k]);
+  return keep_page_pieces(bright, preview.measured);
 }
 
 /// The first paper on every line across a side. Lines on which less than 1.5 mm of table is seen in front of it are
