@@ -2,6 +2,7 @@
 #include "pagesweep/data/page_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pagesweep/base/catmull_rom.h"
@@ -26,6 +27,19 @@ Eigen::Vector3d node(const Image<Eigen::Vector3f>& nodes, int i, int j) {
   return at + std::abs(j - inside) * (at - along_row(j < 0 ? 1 : last - 1));
 }
 
+/// The weighted sum of 4 x 4 nodes, the first of which is (i, j), as rows of twelve numbers.
+Eigen::Vector3d interpolate_inside(const Image<Eigen::Vector3f>& nodes, int i, int j, const std::array<double, 4>& wi,
+                                   const std::array<double, 4>& wj) {
+  std::array<double, 12> row{};
+  for (int b = 0; b < 4; ++b) {
+    const float* node = nodes(i, j + b).data();
+    for (std::size_t k = 0; k < 12; ++k) row[k] += wj[static_cast<std::size_t>(b)] * static_cast<double>(node[k]);
+  }
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t a = 0; a < 4; ++a) sum += wi[a] * Eigen::Map<const Eigen::Vector3d>(&row[3 * a]);
+  return sum;
+}
+
 }  // namespace
 
 Eigen::Vector3d interpolate(const PageSurface& surface, const Image<Eigen::Vector3f>& nodes, double s_mm, double t_mm) {
@@ -41,17 +55,12 @@ Eigen::Vector3d interpolate(const PageSurface& surface, const Image<Eigen::Vecto
   const double dj = std::clamp(j - j0, 0.0, 1.0);
   const auto wi = catmull_rom_weights(di);
   const auto wj = catmull_rom_weights(dj);
-  const bool inside = i0 >= 1 && j0 >= 1 && i0 + 2 < nodes.width() && j0 + 2 < nodes.height();
+  if (i0 >= 1 && j0 >= 1 && i0 + 2 < nodes.width() && j0 + 2 < nodes.height())
+    return interpolate_inside(nodes, i0 - 1, j0 - 1, wi, wj);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (int b = 0; b < 4; ++b)
-    for (int a = 0; a < 4; ++a) {
-      const double weight = wi[static_cast<std::size_t>(a)] * wj[static_cast<std::size_t>(b)];
-      const int column = i0 - 1 + a, row = j0 - 1 + b;
-      if (inside)
-        sum += weight * nodes(column, row).cast<double>();
-      else
-        sum += weight * node(nodes, column, row);
-    }
+    for (int a = 0; a < 4; ++a)
+      sum += wi[static_cast<std::size_t>(a)] * wj[static_cast<std::size_t>(b)] * node(nodes, i0 - 1 + a, j0 - 1 + b);
   if (const double beyond = i - i0 - di; beyond != 0) sum += beyond * (node(nodes, i0 + 1, j0) - node(nodes, i0, j0));
   if (const double beyond = j - j0 - dj; beyond != 0) sum += beyond * (node(nodes, i0, j0 + 1) - node(nodes, i0, j0));
   return sum;

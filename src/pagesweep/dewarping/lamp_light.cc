@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <vector>
 
 #include "pagesweep/base/median.h"
@@ -70,20 +69,22 @@ std::vector<double> light_on(std::span<const PlacedSample> places, const std::op
 
 /// How uneven blank paper is after the light is divided out: 0 not at all, 1 altogether. Each sheet's own brightness is
 /// free.
+/// \param samples  sheet by sheet
 double unevenness(std::span<const double> direct, double ambient, std::span<const PaperSample> samples) {
-  std::vector<double> logs;
-  std::map<int, std::vector<double>> by_sheet;
+  std::vector<double> logs(samples.size());
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const double light = ambient + (1 - ambient) * std::max(direct[k] + samples[k].glow, least_light);
-    logs.push_back(std::log(samples[k].light / light));
-    by_sheet[samples[k].sheet].push_back(logs.back());
+    logs[k] = std::log(samples[k].light / light);
   }
-  std::map<int, double> levels;
-  for (const auto& [sheet, values] : by_sheet) levels[sheet] = median(values);
   double cost = 0;
-  for (std::size_t k = 0; k < samples.size(); ++k) {
-    const double off = std::pow((logs[k] - levels[samples[k].sheet]) / tolerance, 2);
-    cost += off / (1 + off);
+  for (std::size_t begin = 0, end = 0; begin < samples.size(); begin = end) {
+    while (end < samples.size() && samples[end].sheet == samples[begin].sheet) ++end;
+    const std::span<const double> sheet = std::span(logs).subspan(begin, end - begin);
+    const double level = median({sheet.begin(), sheet.end()});
+    for (const double log : sheet) {
+      const double off = std::pow((log - level) / tolerance, 2);
+      cost += off / (1 + off);
+    }
   }
   return cost / static_cast<double>(samples.size());
 }

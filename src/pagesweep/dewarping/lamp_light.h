@@ -61,6 +61,7 @@ struct PaperSample {
 /// them, and how much of the light is ambient, by the least sum of Geman and McClure's robust cost on a grid of all
 /// three. Light from afar without any ambient light is what it has to explain better, clearly; a lamp can be told only
 /// where paper does not lie level.
+/// \param samples  sheet by sheet
 /// \return `light` with what was found; with no ambient light where nothing shows any
 ScanLight find_light(ScanLight light, std::span<const PaperSample> samples);
 

@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "pagesweep/base/parallel.h"
+
 namespace pagesweep {
 namespace {
 
@@ -66,15 +68,17 @@ Occlusion::Occlusion(std::span<const PaperView> pages) {
 
 void Occlusion::add(const PaperView& page) {
   const Image<Eigen::Vector3f>& nodes = page.nodes();
-  std::vector<std::optional<Corner>> corners;
-  corners.reserve(nodes.size());
-  for (const Eigen::Vector3f& node : nodes.pixels()) {
-    const Eigen::Vector3d point = node.cast<double>();
-    const auto pixel = page.scanner().project(point);
-    const double depth = pixel ? depth_of(page.scanner(), point, *pixel) : std::numeric_limits<double>::quiet_NaN();
-    const bool usable = std::isfinite(depth) && pixel->allFinite();
-    corners.push_back(usable ? std::optional(Corner{pixel->x() / cell_px, pixel->y() / cell_px, depth}) : std::nullopt);
-  }
+  std::vector<std::optional<Corner>> corners(nodes.size());
+  parallel_rows(nodes.height(), [&](int j) {
+    for (int i = 0; i < nodes.width(); ++i) {
+      const Eigen::Vector3d point = nodes(i, j).cast<double>();
+      const auto pixel = page.scanner().project(point);
+      const double depth = pixel ? depth_of(page.scanner(), point, *pixel) : std::numeric_limits<double>::quiet_NaN();
+      if (std::isfinite(depth) && pixel->allFinite())
+        corners[static_cast<std::size_t>(j * nodes.width() + i)] =
+            Corner{pixel->x() / cell_px, pixel->y() / cell_px, depth};
+    }
+  });
   const auto corner = [&](int i, int j) { return corners[static_cast<std::size_t>(j * nodes.width() + i)]; };
   for (int j = 0; j + 1 < nodes.height(); ++j)
     for (int i = 0; i + 1 < nodes.width(); ++i) {
