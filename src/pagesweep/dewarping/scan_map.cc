@@ -20,8 +20,9 @@ using Weights = std::array<double, 4>;
 /// Positions in the scan at every `pitch`-th pixel of the page and one node around it.
 class Lattice {
  public:
-  Lattice(const PaperView& view, const Occlusion& occlusion, const PageFrame& frame, double pixels_per_mm)
-      : view_(view), occlusion_(occlusion), frame_(frame), pixels_per_mm_(pixels_per_mm) {
+  Lattice(const PaperView& view, const Occlusion& occlusion, const PageFrame& frame, double pixels_per_mm,
+          double tolerance_px)
+      : view_(view), occlusion_(occlusion), frame_(frame), pixels_per_mm_(pixels_per_mm), tolerance_px_(tolerance_px) {
     // Two nodes from one node of the surface to the next see what its spline does between them; where that is too much
     // for this lattice, the middle of a cell shows it.
     pitch_ = static_cast<int>(std::clamp(view.surface().spacing_mm * pixels_per_mm / 2, 2.0, 16.0));
@@ -32,6 +33,12 @@ class Lattice {
     parallel_rows(nodes_.height(), [&](int j) {
       for (int i = 0; i < nodes_.width(); ++i) set_node(i, j);
     });
+    even_along_ = even_down_ = Image<char>(columns_ + 3, rows_ + 3, false);
+    parallel_rows(nodes_.height(), [&](int j) {
+      for (int i = 0; i + 3 < nodes_.width(); ++i) even_along_(i, j) = is_even(i, j, 1, 0);
+      if (j + 3 < nodes_.height())
+        for (int i = 0; i < nodes_.width(); ++i) even_down_(i, j) = is_even(i, j, 0, 1);
+    });
   }
 
   int pitch() const { return pitch_; }
@@ -39,15 +46,15 @@ class Lattice {
   int rows() const { return rows_; }        ///< cells
 
   /// Whether the cell between nodes (i, j) and (i + 1, j + 1) is seen and interpolated within the tolerance.
-  bool is_smooth(int i, int j, double tolerance_px) const {
+  bool is_smooth(int i, int j) const {
+    if (!seen_(i + 1, j + 1) || !seen_(i + 2, j + 1) || !seen_(i + 1, j + 2) || !seen_(i + 2, j + 2)) return false;
+    if (is_bent_evenly(i, j)) return true;
     for (int b = 0; b < 4; ++b)
       for (int a = 0; a < 4; ++a)
         if (!nodes_(i + a, j + b).allFinite()) return false;
-    if (!seen_(i + 1, j + 1) || !seen_(i + 2, j + 1) || !seen_(i + 1, j + 2) || !seen_(i + 2, j + 2)) return false;
-    if (is_bent_evenly(i, j, tolerance_px)) return true;
     const auto middle = see((i + 0.5) * pitch_, (j + 0.5) * pitch_);
     return middle &&
-           (interpolate_at(i, j, catmull_rom_weights(0.5), catmull_rom_weights(0.5)) - *middle).norm() <= tolerance_px;
+           (interpolate_at(i, j, catmull_rom_weights(0.5), catmull_rom_weights(0.5)) - *middle).norm() <= tolerance_px_;
   }
 
   Eigen::Vector2d interpolate_at(int i, int j, const Weights& wx, const Weights& wy) const {
@@ -77,18 +84,17 @@ class Lattice {
  private:
   /// Whether the third differences of the nodes around a cell are within the tolerance. A cubic between nodes errs by
   /// an eighth of them at most, so that the middle need not be asked.
-  bool is_bent_evenly(int i, int j, double tolerance_px) const {
-    double largest = 0;
-    const auto look = [&](int a, int b, int da, int db) {
-      const Eigen::Vector2d third =
-          nodes_(a + 3 * da, b + 3 * db) - nodes_(a, b) + 3 * (nodes_(a + da, b + db) - nodes_(a + 2 * da, b + 2 * db));
-      largest = std::max(largest, third.cwiseAbs().maxCoeff());
-    };
-    for (int k = 0; k < 4; ++k) {
-      look(i + k, j, 0, 1);
-      look(i, j + k, 1, 0);
-    }
-    return largest < tolerance_px;
+  bool is_bent_evenly(int i, int j) const {
+    bool even = true;
+    for (int k = 0; k < 4; ++k) even &= even_along_(i, j + k) && even_down_(i + k, j);
+    return even;
+  }
+
+  /// Whether the third difference of four nodes, from (i, j) on, is within the tolerance; not if one is not a number.
+  bool is_even(int i, int j, int di, int dj) const {
+    const Eigen::Vector2d third =
+        nodes_(i + 3 * di, j + 3 * dj) - nodes_(i, j) + 3 * (nodes_(i + di, j + dj) - nodes_(i + 2 * di, j + 2 * dj));
+    return std::abs(third.x()) < tolerance_px_ && std::abs(third.y()) < tolerance_px_;
   }
 
   bool is_seen(const Eigen::Vector2d& paper, const Eigen::Vector3d& point, const Eigen::Vector2d& pixel) const {
@@ -106,48 +112,55 @@ class Lattice {
   const PaperView& view_;
   const Occlusion& occlusion_;
   const PageFrame& frame_;
-  double pixels_per_mm_;
+  double pixels_per_mm_, tolerance_px_;
   int pitch_ = 1, columns_ = 0, rows_ = 0;
   Image<Eigen::Vector2d> nodes_;
   Image<char> seen_;
+  Image<char> even_along_, even_down_;  ///< of four nodes each, at the first of them
 };
 
-/// The Catmull-Rom cubic between the second and third of four samples, at k / pitch for k = 0 ... count - 1.
+constexpr int step_px = 4;  // pixels at a time, as compilers make vectors of them
+
+/// The Catmull-Rom cubic between the second and third of four samples, at k / pitch for k = 0 ... pitch - 1, and to the
+/// end of a step.
 /// In float, what is large must come last.
-void fill_cubic(const std::array<double, 4>& p, int pitch, int count, float* out) {
+void fill_cubic(const std::array<double, 4>& p, int pitch, float* out) {
   const auto c0 = static_cast<float>(p[1]), c1 = static_cast<float>(0.5 * (p[2] - p[0]));
   const auto c2 = static_cast<float>(p[0] - 2.5 * p[1] + 2 * p[2] - 0.5 * p[3]);
   const auto c3 = static_cast<float>(0.5 * (p[3] - p[0]) + 1.5 * (p[1] - p[2]));
   const float step = 1 / static_cast<float>(pitch);
-  for (int k = 0; k < count; ++k) {
-    const float x = static_cast<float>(k) * step;
-    out[k] = c0 + x * (c1 + x * (c2 + x * c3));
-  }
+  for (int begin = 0; begin < pitch; begin += step_px)
+    for (int k = begin; k < begin + step_px; ++k) {
+      const float x = static_cast<float>(k) * step;
+      out[k] = c0 + x * (c1 + x * (c2 + x * c3));
+    }
 }
 
 /// Fills the map's pixels in the j-th row of lattice cells.
-void fill_cells(const Lattice& lattice, int j, double tolerance_px, ScanMap& map) {
+void fill_cells(const Lattice& lattice, int j, ScanMap& map) {
   const int pitch = lattice.pitch();
   std::vector<char> smooth(static_cast<std::size_t>(lattice.columns()));
-  for (int i = 0; i < lattice.columns(); ++i)
-    smooth[static_cast<std::size_t>(i)] = lattice.is_smooth(i, j, tolerance_px);
+  for (int i = 0; i < lattice.columns(); ++i) smooth[static_cast<std::size_t>(i)] = lattice.is_smooth(i, j);
   std::vector<Eigen::Vector2d> row;
+  std::vector<float> u(static_cast<std::size_t>(lattice.columns() * pitch + step_px)), v = u;
   for (int y = j * pitch; y < std::min((j + 1) * pitch, map.height()); ++y) {
     lattice.interpolate_row(j, catmull_rom_weights(double(y - j * pitch) / pitch), row);
     for (int i = 0; i < lattice.columns(); ++i) {
-      const int begin = i * pitch, end = std::min(begin + pitch, map.width());
-      if (smooth[static_cast<std::size_t>(i)]) {
+      const auto begin = static_cast<std::size_t>(i * pitch), end = begin + static_cast<std::size_t>(pitch);
+      if (smooth[static_cast<std::size_t>(i)]) {  // what it writes beyond the cell is the next one's
         const Eigen::Vector2d* p = &row[static_cast<std::size_t>(i)];
-        fill_cubic({p[0].x(), p[1].x(), p[2].x(), p[3].x()}, pitch, end - begin, &map.u(begin, y));
-        fill_cubic({p[0].y(), p[1].y(), p[2].y(), p[3].y()}, pitch, end - begin, &map.v(begin, y));
+        fill_cubic({p[0].x(), p[1].x(), p[2].x(), p[3].x()}, pitch, &u[begin]);
+        fill_cubic({p[0].y(), p[1].y(), p[2].y(), p[3].y()}, pitch, &v[begin]);
         continue;
       }
-      for (int x = begin; x < end; ++x)
-        if (const auto pixel = lattice.see(x, y)) {
-          map.u(x, y) = static_cast<float>(pixel->x());
-          map.v(x, y) = static_cast<float>(pixel->y());
-        }
+      for (std::size_t x = begin; x < end; ++x) {
+        const auto pixel = lattice.see(static_cast<double>(x), y);
+        u[x] = pixel ? static_cast<float>(pixel->x()) : not_a_number;
+        v[x] = pixel ? static_cast<float>(pixel->y()) : not_a_number;
+      }
     }
+    std::copy_n(u.begin(), map.width(), map.u.row(y).begin());
+    std::copy_n(v.begin(), map.width(), map.v.row(y).begin());
   }
 }
 
@@ -157,9 +170,9 @@ ScanMap build_scan_map(const PaperView& view, const Occlusion& occlusion, const 
                        double tolerance_px) {
   if (!(pixels_per_mm > 0) || !(tolerance_px > 0))
     throw std::invalid_argument("build_scan_map: pixels_per_mm and tolerance_px must be positive");
-  const Lattice lattice(view, occlusion, frame, pixels_per_mm);
+  const Lattice lattice(view, occlusion, frame, pixels_per_mm, tolerance_px);
   ScanMap map(frame.width_px(pixels_per_mm), frame.height_px(pixels_per_mm));
-  parallel_rows(lattice.rows(), [&](int j) { fill_cells(lattice, j, tolerance_px, map); });
+  parallel_rows(lattice.rows(), [&](int j) { fill_cells(lattice, j, map); });
   return map;
 }
 

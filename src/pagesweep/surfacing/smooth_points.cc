@@ -67,18 +67,24 @@ bool has_point(const PointMap& map, int x, int y) {
          map.sigma(x, y) > 0 && std::isfinite(map.sigma(x, y));
 }
 
-/// The points of one camera, in the order of its pixels.
-void append_points(const PointMap& map, const PlanFrame& frame, std::vector<PlanPoint>& points) {
-  std::vector<std::size_t> first(static_cast<std::size_t>(map.height()) + 1, 0);  // of each row
+/// How many points the rows above each row of pixels have, and all.
+std::vector<std::size_t> count_points(const PointMap& map) {
+  std::vector<std::size_t> above(static_cast<std::size_t>(map.height()) + 1, 0);
   parallel_rows(map.height(), [&](int y) {
-    for (int x = 0; x < map.width(); ++x) first[static_cast<std::size_t>(y) + 1] += has_point(map, x, y);
+    std::size_t count = 0;
+    for (int x = 0; x < map.width(); ++x) count += has_point(map, x, y);
+    above[static_cast<std::size_t>(y) + 1] = count;
   });
-  first[0] = points.size();
-  for (std::size_t y = 0; y + 1 < first.size(); ++y) first[y + 1] += first[y];
-  points.resize(first.back());
+  for (std::size_t y = 0; y + 1 < above.size(); ++y) above[y + 1] += above[y];
+  return above;
+}
+
+/// The points of one camera, in the order of its pixels.
+void place_points(const PointMap& map, const std::vector<std::size_t>& above, const PlanFrame& frame,
+                  PlanPoint* points) {
   const double c = std::cos(frame.angle_rad), s = std::sin(frame.angle_rad);
   parallel_rows(map.height(), [&](int y) {
-    PlanPoint* point = points.data() + first[static_cast<std::size_t>(y)];
+    PlanPoint* point = points + above[static_cast<std::size_t>(y)];
     for (int x = 0; x < map.width(); ++x) {
       if (!has_point(map, x, y)) continue;
       const double px = map.x(x, y), py = map.y(x, y);
@@ -89,8 +95,13 @@ void append_points(const PointMap& map, const PlanFrame& frame, std::vector<Plan
 }
 
 std::vector<PlanPoint> gather_points(std::span<const PointMap> cameras, const PlanFrame& frame) {
-  std::vector<PlanPoint> points;
-  for (const PointMap& map : cameras) append_points(map, frame, points);
+  std::vector<std::vector<std::size_t>> counts;
+  std::size_t count = 0;
+  for (const PointMap& map : cameras) count += counts.emplace_back(count_points(map)).back();
+  std::vector<PlanPoint> points(count);
+  PlanPoint* next = points.data();
+  for (std::size_t c = 0; c < cameras.size(); next += counts[c++].back())
+    place_points(cameras[c], counts[c], frame, next);
   return points;
 }
 
@@ -99,12 +110,14 @@ std::pair<double, double> bounds_of(const std::vector<PlanPoint>& points, float 
   std::vector<float> values;
   const std::size_t stride = std::max<std::size_t>(1, points.size() / 200000);
   for (std::size_t i = 0; i < points.size(); i += stride) values.push_back(points[i].*coordinate);
-  const auto at = [&](double share) {
-    const auto n = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), n, values.end());
-    return static_cast<double>(*n);
+  const auto place = [&](double share) {
+    return values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   };
-  const double low = at(0.002), high = at(0.998);
+  const auto at_low = place(0.002), at_high = place(0.998);
+  std::nth_element(values.begin(), at_low, values.end());
+  const double low = *at_low;
+  std::nth_element(at_low, at_high, values.end());
+  const double high = *at_high;
   const double slack = 0.05 * (high - low) + 1;
   return {low - slack, high + slack};
 }
@@ -112,11 +125,20 @@ std::pair<double, double> bounds_of(const std::vector<PlanPoint>& points, float 
 /// Cells of such a size that the occupied ones hold about four points.
 double choose_cell_mm(const std::vector<PlanPoint>& points, double p0, double p1, double q0, double q1) {
   const double block = std::max(4.0, std::sqrt((p1 - p0) * (q1 - q0) / largest_field_cells));
-  Image<std::uint8_t> occupied(static_cast<int>((p1 - p0) / block) + 1, static_cast<int>((q1 - q0) / block) + 1);
-  for (const PlanPoint& point : points) {
-    const int i = static_cast<int>((point.p - p0) / block), j = static_cast<int>((point.q - q0) / block);
-    if (occupied.contains(i, j)) occupied(i, j) = 1;
-  }
+  const int columns = static_cast<int>((p1 - p0) / block) + 1, rows = static_cast<int>((q1 - q0) / block) + 1;
+  constexpr int shares = 8;
+  const int count = static_cast<int>(points.size()), grain = count / shares + 1;
+  Image<std::uint8_t> by_share(columns * rows, shares);
+  parallel_ranges(count, grain, [&](int begin, int end) {
+    for (int n = begin; n < end; ++n) {
+      const PlanPoint& point = points[static_cast<std::size_t>(n)];
+      const int i = static_cast<int>((point.p - p0) / block), j = static_cast<int>((point.q - q0) / block);
+      if (i >= 0 && j >= 0 && i < columns && j < rows) by_share(j * columns + i, begin / grain) = 1;
+    }
+  });
+  Image<std::uint8_t> occupied(columns * rows, 1);
+  for (int share = 0; share < shares; ++share)
+    for (int k = 0; k < occupied.width(); ++k) occupied(k, 0) |= by_share(k, share);
   const auto blocks = std::max<std::ptrdiff_t>(1, std::ranges::count(occupied.pixels(), 1));
   const double density = static_cast<double>(points.size()) / (static_cast<double>(blocks) * block * block);
   const double smallest = std::sqrt((p1 - p0) * (q1 - q0) / largest_field_cells);
@@ -126,8 +148,12 @@ double choose_cell_mm(const std::vector<PlanPoint>& points, double p0, double p1
 }
 
 HeightField empty_field(const std::vector<PlanPoint>& points, const SmoothingOptions& options) {
-  const auto [p0, p1] = bounds_of(points, &PlanPoint::p);
-  const auto [q0, q1] = bounds_of(points, &PlanPoint::q);
+  std::array<std::pair<double, double>, 2> bounds;
+  parallel_rows(2, [&](int k) {
+    bounds[static_cast<std::size_t>(k)] = bounds_of(points, k == 0 ? &PlanPoint::p : &PlanPoint::q);
+  });
+  const auto [p0, p1] = bounds[0];
+  const auto [q0, q1] = bounds[1];
   HeightField field;
   field.frame.angle_rad = options.reading_direction_rad;
   field.cell_mm = options.cell_mm > 0 ? options.cell_mm : choose_cell_mm(points, p0, p1, q0, q1);
