@@ -4,17 +4,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
+
+#include "pagesweep/timing/mills_ratio_internal.h"
 
 namespace pagesweep {
 namespace {
-
-/// phi(z) / Phi(z) of the standard normal distribution.
-double inverse_mills_ratio(double z) {
-  if (z < -8) return -z - 1 / z;  // asymptotic, 2 % off at -8 where no sample of a sound fit is
-  return std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi) / (0.5 * std::erfc(-z / std::numbers::sqrt2));
-}
 
 /// Sums over all samples for one Gauss-Newton step in N unknowns.
 template <int N>

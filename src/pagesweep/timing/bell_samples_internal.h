@@ -12,16 +12,19 @@ namespace pagesweep {
 /// The samples of one pixel's recorded window, made ready for PlainBells.
 struct BellSamples {
   enum class Kind {
-    core,        ///< if samples are missing, then at the bell's foot: PlainBells::fit()
-    partial,     ///< others are missing: fit_partial()
-    uneven,      ///< frames were exposed a little late: fit_partial()
-    too_uneven,  ///< no plain case
-    clipped      ///< no plain case
+    core,            ///< if samples are missing, then at the bell's foot
+    partial,         ///< others are missing
+    uneven,          ///< frames were exposed a little late
+    clipped,         ///< some are clipped
+    clipped_uneven,  ///< both
+    too_uneven       ///< no plain case
   };
+  static Content content_of(Kind kind);
   int centre = 0;  ///< [frames] of the bell, nearly
   float log_width = 0;
   const BellTable* table = nullptr;
-  const float* light = nullptr;  ///< black level removed, from the window's first on
+  const float* light = nullptr;  ///< black level removed, from the window's first on; +infinity: clipped
+  int start = 0;                 ///< [frames] after the centre where the bell's middle may be
   Kind kind = Kind::core;
 };
 
@@ -40,11 +43,14 @@ class BellReader {
  private:
   template <class T>
   void read(const T* gray, int centre, float log_width, int slot, BellSamples& samples);
-  BellSamples::Kind kind_of(const BellSamples& samples) const;
+  BellSamples::Kind kind_of(const BellSamples& samples, bool is_clipped) const;
+  /// Whether any sample that counts is clipped.
   bool is_clipped(const BellSamples& samples) const;
+  int plateau(const BellSamples& samples) const;
 
   const StripeWindows& windows_;
   const PlainBells& bells_;
+  int near_;  ///< [frames] from a bell's expected middle, where a plateau may be met
   int core_;  ///< [frames] to both sides of a bell's expected middle
   std::vector<float> light_;
 };

@@ -30,6 +30,16 @@ struct BellTable {
   std::vector<float> inside;                                             ///< [length] 1 for samples within reach
   std::vector<float> rising, falling;                                    ///< [phases + 1] sums of squared slopes
 
+  /// The profile where a stretch of `frames`, as high at its beginning as at its end if the profile is symmetric,
+  /// begins and ends: the mean of both.
+  float height_over(int frames) const {
+    // Half frames are those of the first row's.
+    const int half = frames / 2, is_odd = frames % 2;
+    const auto row = static_cast<std::size_t>(is_odd ? 0 : phases / 2 * length);
+    if (half >= reach) return 0;
+    return 0.5F * (value[row + static_cast<std::size_t>(reach - half - is_odd)] +
+                   value[row + static_cast<std::size_t>(reach + half)]);
+  }
   /// What the samples of one flank, 0: rising, 1: falling, tell about the time: their sum of squared slopes.
   double flank(int side, int row) const {
     return static_cast<double>((side == 0 ? rising : falling)[static_cast<std::size_t>(row)]);

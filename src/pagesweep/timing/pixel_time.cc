@@ -10,6 +10,8 @@
 namespace pagesweep {
 namespace {
 
+constexpr double most_misfit = 0.1;  // of the height
+
 /// How much of one flank's information about the time, the sum of squared slopes, is there.
 struct Flank {
   double whole = 0;     ///< were all frames recorded and none clipped
@@ -41,7 +43,6 @@ Flanks examine_flanks(const PixelWindow& window, const Bell& bell, const PixelJu
   return flanks;
 }
 
-/// The same of samples none of which is clipped.
 Flanks examine_flanks(const BellPlace& place, const PixelJudge& judge) {
   const BellTable& table = *place.table;
   const float* slope = &table.slope[static_cast<std::size_t>(place.row * table.length)];
@@ -51,10 +52,15 @@ Flanks examine_flanks(const BellPlace& place, const PixelJudge& judge) {
     flank.whole = flank.recorded = flank.usable = table.flank(side, place.row);
   }
   for (int k = 0; k <= 2 * table.reach; ++k) {
-    if (place.present[k] > 0) continue;
+    const bool is_clipped = std::isinf(place.gray[k]);
+    if (place.present[k] > 0 && !is_clipped) continue;
     Flank& flank = flanks[slope[k] > 0 ? 0 : 1];
     const auto information = static_cast<double>(slope[k] * slope[k]);
     flank.usable -= information;
+    if (place.present[k] > 0) {
+      flank.clipped += information;
+      continue;
+    }
     const int frame = place.first_frame + k;
     if (frame < 0 || frame >= judge.frame_count) flank.recorded -= information;
   }
@@ -81,6 +87,29 @@ bool misfits(const PixelWindow& window, const Bell& bell, const PixelJudge& judg
   // Times its weight, a sample's variance is at most that of the longest exposure.
   const double variance = judge.noise.sensor().variance(bell.background + bell.amplitude) * (samples / weights);
   return misfit > 3 * std::sqrt(variance) && misfit > most * bell.amplitude;
+}
+
+/// The same from a table.
+bool misfits(const BellPlace& place, const Bell& bell, const PixelJudge& judge, double most) {
+  const BellTable& table = *place.table;
+  const double reach = 0.75 * judge.profile.full_width_half_maximum() * bell.width;
+  const auto row = static_cast<std::size_t>(place.row * table.length);
+  double squares = 0;
+  int samples = 0;
+  for (int k = 0; k <= 2 * table.reach; ++k) {
+    const double after = place.first_frame + k - bell.time;
+    if (std::abs(after) > reach || place.present[k] == 0 || std::isinf(place.gray[k])) continue;
+    const std::size_t at = row + static_cast<std::size_t>(k);
+    const double height = static_cast<double>(table.value[at]) - place.rest * static_cast<double>(table.slope[at]);
+    const double residual =
+        static_cast<double>(place.gray[k]) - bell.amplitude * height - bell.background_at(place.first_frame + k);
+    squares += residual * residual;
+    ++samples;
+  }
+  if (samples == 0) return false;
+  const double misfit = std::sqrt(squares / samples);
+  return misfit > 3 * std::sqrt(judge.noise.sensor().variance(bell.background + bell.amplitude)) &&
+         misfit > most * bell.amplitude;
 }
 
 /// Reduced chi square beyond which noise cannot be the reason any more: four standard deviations.
@@ -119,11 +148,10 @@ double mean_lateness(const PixelWindow& window, const Bell& bell, const StripePr
   return sum / weights;
 }
 
-/// The bell's middle part on a curved background. Half a width at half height beyond the half-height points a bell has
-/// nearly ended; a wider piece would need a more flexible background.
+/// The bell's middle part on a curved background.
 BellFit fit_core(const PixelWindow& window, const BellFit& first, const PixelJudge& judge) {
   const Bell& start = first.converged ? first.bell : window.start;
-  const double reach = 1.25 * judge.profile.full_width_half_maximum() * start.width;
+  const double reach = core_widths * judge.profile.full_width_half_maximum() * start.width;
   const int size = static_cast<int>(window.gray.size());
   const int begin = std::clamp(static_cast<int>(std::ceil(start.time - reach)) - window.first_frame, 0, size);
   const int end = std::clamp(static_cast<int>(std::floor(start.time + reach)) + 1 - window.first_frame, begin, size);
@@ -133,13 +161,40 @@ BellFit fit_core(const PixelWindow& window, const BellFit& first, const PixelJud
                    .late = window.late.empty() ? window.late : window.late.subspan(offset, count)});
 }
 
+/// An estimate of a bell's time, and what it is worth.
+struct Opinion {
+  bool converged;
+  double time, sigma;  ///< [frames]
+  double reduced_chi_square;
+};
+Opinion opinion_of(const BellFit& fit) {
+  return {fit.converged, fit.bell.time, fit.time_sigma(), fit.reduced_chi_square()};
+}
+Opinion opinion_of(const PlainBells::Fit& fit, int unknowns) {
+  return {fit.converged, fit.time, fit.time_sigma, fit.chi_square / std::max(1, fit.samples - unknowns)};
+}
+
 /// Whether a robust estimate shows the efficient one to be wrong.
-bool contradicts(const BellFit& robust, const BellFit& efficient) {
-  if (!robust.converged || robust.reduced_chi_square() > efficient.reduced_chi_square()) return false;
+bool contradicts(const Opinion& robust, const Opinion& efficient) {
+  if (!robust.converged || robust.reduced_chi_square > efficient.reduced_chi_square) return false;
   if (!efficient.converged) return true;
-  const double robust_sigma = robust.time_sigma(), efficient_sigma = efficient.time_sigma();
-  const double variance = std::max(robust_sigma * robust_sigma - efficient_sigma * efficient_sigma, 1e-12);
-  return std::abs(robust.bell.time - efficient.bell.time) > 2 * std::sqrt(variance);
+  const double variance = std::max(robust.sigma * robust.sigma - efficient.sigma * efficient.sigma, 1e-12);
+  return std::abs(robust.time - efficient.time) > 2 * std::sqrt(variance);
+}
+
+/// Whether a bell is higher than what its curved background bends by over the bell's core.
+bool stands_out(const Bell& bell, const PixelJudge& judge) {
+  const double core = core_widths * judge.profile.full_width_half_maximum() * bell.width;
+  return bell.amplitude > std::abs(bell.curvature) * core * core;
+}
+
+/// [frames] What may be wrong with a time after a correction. A curved background takes up most of a hump, not all: up
+/// to a third of the correction was missing in simulations.
+double doubt_about(double correction) { return 0.25 * std::abs(correction); }
+
+/// More than the noise tells, where residuals are more than noise.
+double enlarged(double sigma, double reduced_chi_square, int samples) {
+  return sigma * std::sqrt(std::max(1.0, reduced_chi_square / noise_limit(samples)));
 }
 
 /// What judge_bell() looks at besides the residuals.
@@ -173,7 +228,6 @@ PixelTime describe(const PixelWindow& window, const Bell& bell, double sigma, do
 }  // namespace
 
 PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma, const PixelJudge& judge) {
-  constexpr double most_misfit = 0.1;
   const auto flanks = [&] { return examine_flanks(window, bell, judge); };
   const PixelStatus status = judge_but_for_shape(bell, sigma, judge, flanks);
   if (status != PixelStatus::ok || !judge.refuse_misfits) return status;
@@ -208,6 +262,28 @@ std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double w
                    .background = fit.background,
                    .bell_time = fit.time,
                    .status = dark ? PixelStatus::too_dark : PixelStatus::ok};
+}
+
+PixelTime time_of_doubtful_bell(const PlainBells::Fit& first, const PlainBells::Fit& second,
+                                const std::function<BellPlace(double time)>& place_of, double width,
+                                const PixelJudge& judge) {
+  const Opinion efficient = opinion_of(first, 3), robust = opinion_of(second, 5);
+  const bool is_corrected = contradicts(robust, efficient);
+  const PlainBells::Fit& fit = is_corrected ? second : first;
+  const double doubt = is_corrected ? doubt_about(second.time - first.time) : 0;
+  const double reduced_chi_square = is_corrected ? robust.reduced_chi_square : efficient.reduced_chi_square;
+  const double sigma = std::hypot(enlarged(fit.time_sigma, reduced_chi_square, fit.samples), doubt);
+  const Bell bell{fit.amplitude, fit.background, fit.time, width, fit.slope, fit.curvature};
+  const BellPlace place = place_of(fit.time);
+  PixelStatus status = judge_but_for_shape(bell, sigma, judge, [&] { return examine_flanks(place, judge); });
+  if (status == PixelStatus::ok && misfits(place, bell, judge, most_misfit)) status = PixelStatus::bad_fit;
+  return {.time = fit.time,
+          .sigma = sigma,
+          .amplitude = fit.amplitude,
+          .residual = std::sqrt(efficient.reduced_chi_square),
+          .background = fit.background,
+          .bell_time = fit.time,
+          .status = status};
 }
 
 PixelTime time_by_center_of_mass(const PixelWindow& window, const PixelJudge& judge) {
@@ -283,15 +359,15 @@ PixelTime time_by_likelihood(const PixelWindow& window, const PixelJudge& judge)
   double doubt = 0;  // [frames] about a correction
   if (judge.refuse_misfits && fit.reduced_chi_square() > noise_limit(fit.samples)) {
     const BellFit second = fit_core(window, fit, judge);
-    if (contradicts(second, fit)) {
-      // A curved background takes up most of a hump, not all: up to a third of the correction was missing in
-      // simulations.
-      doubt = 0.25 * std::abs(second.bell.time - fit.bell.time);
+    // Without a first opinion, a second one may be any rise towards the recording's end.
+    const bool is_bell = fit.converged || stands_out(second.bell, judge);
+    if (is_bell && contradicts(opinion_of(second), opinion_of(fit))) {
+      doubt = doubt_about(second.bell.time - fit.bell.time);
       fit = second;
     }
   }
-  const double scale = std::sqrt(std::max(1.0, fit.reduced_chi_square() / noise_limit(fit.samples)));
-  PixelTime result = describe(window, fit.bell, std::hypot(scale * fit.time_sigma(), doubt), misfit, judge);
+  const double sigma = enlarged(fit.time_sigma(), fit.reduced_chi_square(), fit.samples);
+  PixelTime result = describe(window, fit.bell, std::hypot(sigma, doubt), misfit, judge);
   if (!fit.converged && result.status == PixelStatus::ok) result.status = PixelStatus::bad_fit;
   return result;
 }

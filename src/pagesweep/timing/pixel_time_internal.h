@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include "pagesweep/data/time_map.h"
@@ -80,12 +81,21 @@ PixelStatus judge_bell(const PixelWindow& window, const Bell& bell, double sigma
 struct BellPlace {
   const BellTable* table;
   int row;
+  double rest;           ///< [frames] by which it is later than the row's bell
   int first_frame;       ///< of the row's first entry
   const float* present;  ///< for each entry of the row 1, or 0 where there is no sample
+  const float* gray;     ///< for each the sample; +infinity: clipped
 };
 
-/// The same of a plain bell of which samples are missing, and whose chi square is no more than noise.
+/// The same of a plain bell of which samples are missing or clipped, and whose chi square is no more than noise.
 PixelStatus judge_partial_bell(const PlainBells::Fit& fit, double sigma, const BellPlace& place, double width,
                                const PixelJudge& judge);
+
+/// What time_by_likelihood() says of a plain bell whose residuals are more than noise.
+/// \param second    its core's fit on a curved background
+/// \param place_of  gives the BellPlace of a bell at a moment
+PixelTime time_of_doubtful_bell(const PlainBells::Fit& first, const PlainBells::Fit& second,
+                                const std::function<BellPlace(double time)>& place_of, double width,
+                                const PixelJudge& judge);
 
 }  // namespace pagesweep

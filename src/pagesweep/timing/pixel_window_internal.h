@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 
@@ -23,6 +24,22 @@ struct PixelWindow {
 
 /// [frames] to both sides of the stripe's middle, at width 1, that a window has.
 double reach_around(const StripeProfile& profile);
+
+/// The middle of the plateau of clipped samples that is met within `near` entries of `centre`; `centre` if there is
+/// none. A dropped frame does not end a plateau.
+/// \param is_clipped, is_there  tell it of entries 0 ... count - 1
+template <class IsClipped, class IsThere>
+int plateau_middle(int centre, int near, int count, const IsClipped& is_clipped, const IsThere& is_there) {
+  const auto goes_on = [&](int k) { return is_clipped(k) || !is_there(k); };
+  int begin = std::max(0, centre - near);
+  const int stop = std::min(count, centre + near + 1);
+  while (begin < stop && !(is_clipped(begin) && is_there(begin))) ++begin;
+  if (begin == stop) return centre;
+  int end = begin;
+  while (end < count && goes_on(end)) ++end;
+  while (begin > 0 && goes_on(begin - 1)) --begin;
+  return (begin + end - 1) / 2;
+}
 
 /// Takes a first look at samples.
 /// \param centre  [frames] where the bell is expected

@@ -64,7 +64,7 @@ class PlainBellsTest : public ::testing::Test {
   void fit(bool partial) {
     bells.clear();
     for (int p = 0; p < most_bells; ++p) add(p, static_cast<float>(std::log(truth[static_cast<std::size_t>(p)].width)));
-    partial ? bells.fit_partial() : bells.fit();
+    bells.fit(partial ? Content::partial : Content::whole);
   }
 
   /// The scalar way, over the samples that the vectors' last step saw.
@@ -120,7 +120,7 @@ TEST_F(PlainBellsTest, WidthsAgreeWithTheScalarFitOnEveryInstructionSet) {
     for (int round = 0; round < 2; ++round) {
       bells.clear();
       for (int p = 0; p < most_bells; ++p) add(p, widths[static_cast<std::size_t>(p)]);
-      bells.fit_widths(true);
+      bells.fit_widths(Content::partial);
       for (int p = 0; p < most_bells; ++p) widths[static_cast<std::size_t>(p)] = static_cast<float>(bells[p].log_width);
     }
     for (int p = 0; p < most_bells; ++p) {
@@ -162,7 +162,7 @@ TEST_F(PlainBellsTest, ABellThatIsElsewhereIsNoPlainCase) {
   const auto first = static_cast<std::size_t>(count + 30 - bells.reach());
   bells.add(30, bells.table(0), 0, gray[15].data() + first,
             present.data() + first);  // 50 frames before it: nothing but noise
-  bells.fit();
+  bells.fit(Content::whole);
   EXPECT_TRUE(!bells[0].converged || bells[0].amplitude < 5 * std::sqrt(noise.read_variance));
 }
 

@@ -26,16 +26,8 @@ int RecordedWindows::frame(int x) const {
   const int near = static_cast<int>(std::ceil(0.5 * profile_.full_width_half_maximum()));
   const float* present = windows_.present(centre - half);
   return with_gray(windows_, x, y_, [&](const auto* gray) {
-    // A dropped frame does not end a plateau.
-    const auto is_clipped = [&](int k) { return gray[k] >= windows_.sequence().saturation || present[k] == 0; };
-    int begin = std::max(0, half - near);
-    const int stop = std::min(length, half + near + 1);
-    while (begin < stop && !(is_clipped(begin) && present[begin] > 0)) ++begin;
-    if (begin == stop) return centre;
-    int end = begin;
-    while (end < length && is_clipped(end)) ++end;
-    while (begin > 0 && is_clipped(begin - 1)) --begin;
-    return centre - half + (begin + end - 1) / 2;
+    const auto is_clipped = [&](int k) { return gray[k] >= windows_.sequence().saturation; };
+    return centre - half + plateau_middle(half, near, length, is_clipped, [&](int k) { return present[k] > 0; });
   });
 }
 

@@ -11,6 +11,11 @@ namespace {
 
 constexpr float hardly_significant = 4;
 
+/// Whether no sample was exposed later than its frame.
+bool is_even(BellSamples::Kind kind) {
+  return kind != BellSamples::Kind::uneven && kind != BellSamples::Kind::clipped_uneven;
+}
+
 }  // namespace
 
 TileTimes::TileTimes(const StripeWindows& windows, const BellTables& tables, const StripeWidths& widths,
@@ -30,10 +35,9 @@ void TileTimes::estimate(int y, int left, int columns) {
   for (int first = left; first < left + columns; first += most_bells) {
     gather(y, first, std::min(most_bells, left + columns - first));
     if (candidates_.empty()) continue;
-    for (const BellSamples::Kind kind : {core, partial, uneven}) fit(kind, y);
+    for (const BellSamples::Kind kind : {core, partial, uneven, clipped, clipped_uneven}) fit(kind, y);
     for (const Candidate& candidate : candidates_)
-      if (candidate.samples.kind == too_uneven || candidate.samples.kind == clipped)
-        set_time(map_, candidate.x, y, look_closely(candidate));
+      if (candidate.samples.kind == too_uneven) set_time(map_, candidate.x, y, look_closely(candidate));
   }
 }
 
@@ -62,21 +66,51 @@ void TileTimes::fit(BellSamples::Kind kind, int y) {
     reader_.add_to(bells_, candidate.samples);
   }
   if (fitted_.empty()) return;
-  kind == BellSamples::Kind::core ? bells_.fit() : bells_.fit_partial();
+  bells_.fit(BellSamples::content_of(kind));
+  doubtful_.clear();
   for (std::size_t i = 0; i < fitted_.size(); ++i) {
     const Candidate& candidate = *fitted_[i];
     const PlainBells::Fit bell = bells_[static_cast<int>(i)];
     auto time = time_of(candidate, bell);
+    if (!time && !candidate.may_be_noise && bell.converged && is_even(kind) && is_whole(candidate.samples)) {
+      doubtful_.push_back({&candidate, bell});
+      continue;
+    }
     if (!time) time = candidate.may_be_noise ? PixelTime{} : look_closely(candidate, &bell);
     set_time(map_, candidate.x, y, *time);
   }
+  ask_for_second_opinions(y);
+}
+
+void TileTimes::ask_for_second_opinions(int y) {
+  if (doubtful_.empty()) return;
+  bells_.clear();
+  for (const Doubtful& doubtful : doubtful_) {
+    reader_.add_to(bells_, doubtful.candidate->samples);
+    bells_.start_at(doubtful.bell);
+  }
+  bells_.fit_on_curved();
+  for (std::size_t i = 0; i < doubtful_.size(); ++i) {
+    const auto& [candidate, bell] = doubtful_[i];
+    const BellSamples& samples = candidate->samples;
+    const PlainBells::Fit second = bells_[static_cast<int>(i)];
+    const auto place = [&](double time) { return place_of(samples, time); };
+    set_time(map_, candidate->x, y, time_of_doubtful_bell(bell, second, place, width_of(samples), judge_));
+  }
+}
+
+double TileTimes::width_of(const BellSamples& samples) {
+  return static_cast<double>(samples.table->width * (1 + samples.log_width - samples.table->log_width));
 }
 
 std::optional<PixelTime> TileTimes::time_of(const Candidate& candidate, const PlainBells::Fit& bell) const {
   const BellSamples& samples = candidate.samples;
-  const double width = static_cast<double>(samples.table->width * (1 + samples.log_width - samples.table->log_width));
+  const bool is_clipped = BellSamples::content_of(samples.kind) == Content::clipped;
+  // Where a bell of which only the flanks are seen has gone, nobody knows.
+  if (is_clipped && !bell.converged) return std::nullopt;
+  const double width = width_of(samples);
   auto time = time_of_plain_bell(bell, width, judge_);
-  if (time && time->status != PixelStatus::truncated && !is_recorded(samples, time->bell_time, width))
+  if (time && time->status != PixelStatus::truncated && (is_clipped || !is_recorded(samples, time->bell_time, width)))
     time->status = judge_partial_bell(bell, time->sigma, place_of(samples, bell.time), width, judge_);
   return time;
 }
@@ -91,9 +125,13 @@ PixelTime TileTimes::look_closely(const Candidate& candidate, const PlainBells::
   return time_by_likelihood_around(alone_.frame(candidate.x), window_around, judge_);
 }
 
-bool TileTimes::is_recorded(const BellSamples& samples, double time, double width) const {
+bool TileTimes::is_whole(const BellSamples& samples) const {
   const int reach = bells_.reach(*samples.table);
-  if (windows_.are_present(samples.centre - reach, 2 * reach + 1)) return true;
+  return windows_.are_present(samples.centre - reach, 2 * reach + 1);
+}
+
+bool TileTimes::is_recorded(const BellSamples& samples, double time, double width) const {
+  if (is_whole(samples)) return true;
   const int begin = static_cast<int>(std::floor(time + width * judge_.profile.begin()));
   const int end = static_cast<int>(std::ceil(time + width * judge_.profile.end()));
   return windows_.are_present(begin, end - begin + 1);
@@ -101,7 +139,13 @@ bool TileTimes::is_recorded(const BellSamples& samples, double time, double widt
 
 BellPlace TileTimes::place_of(const BellSamples& samples, double time) const {
   const int frame = static_cast<int>(std::lround(time)), first = frame - samples.table->reach;
-  return {samples.table, BellTable::row_of(time - frame), first, windows_.present(first)};
+  const int row = BellTable::row_of(time - frame);
+  return {samples.table,
+          row,
+          time - frame - BellTable::phase_of(row),
+          first,
+          windows_.present(first),
+          samples.light + (first - samples.centre + windows_.half())};
 }
 
 }  // namespace pagesweep

@@ -12,8 +12,8 @@
 
 namespace pagesweep {
 
-/// Refined time values from recorded windows. Nearly all pixels are plain cases, which vectors fit some at once; the
-/// others are looked at one by one. One a thread.
+/// Refined time values from recorded windows. Nearly all pixels are fitted some at once in vectors; the others are
+/// looked at one by one. One a thread.
 class TileTimes {
  public:
   /// The arguments must outlive this.
@@ -30,15 +30,25 @@ class TileTimes {
     bool may_be_noise = false;  ///< a bell at the limit of judge_bell(): if it cannot be fitted it is none
   };
 
+  /// A pixel whose residuals are more than noise.
+  struct Doubtful {
+    const Candidate* candidate;
+    PlainBells::Fit bell;
+  };
+
   void gather(int y, int left, int columns);
   void fit(BellSamples::Kind kind, int y);
+  void ask_for_second_opinions(int y);
   /// The verdict of the fit, if it is one.
   std::optional<PixelTime> time_of(const Candidate& candidate, const PlainBells::Fit& bell) const;
   /// \param plain  its fit as a plain case, which did not do; null: there is none
   PixelTime look_closely(const Candidate& candidate, const PlainBells::Fit* plain = nullptr);
+  /// Whether every frame is there that may be looked at.
+  bool is_whole(const BellSamples& samples) const;
   /// Whether every frame is there that shows something of the bell.
   bool is_recorded(const BellSamples& samples, double time, double width) const;
   BellPlace place_of(const BellSamples& samples, double time) const;
+  static double width_of(const BellSamples& samples);
 
   const StripeWindows& windows_;
   const StripeWidths& widths_;
@@ -50,6 +60,7 @@ class TileTimes {
   std::vector<float> log_widths_;
   std::vector<Candidate> candidates_;
   std::vector<const Candidate*> fitted_;
+  std::vector<Doubtful> doubtful_;
 };
 
 }  // namespace pagesweep

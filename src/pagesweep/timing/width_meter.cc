@@ -25,7 +25,8 @@ void WidthMeter::add(int x, int y) {
   if (windows_.centre(x, y) == StripeWindows::none || windows_.significance(x, y) < least_significance_of_width) return;
   BellSamples samples;
   reader_.read(x, y, 0, static_cast<int>(waiting_.size()), samples);
-  if (samples.kind == BellSamples::Kind::core || samples.kind == BellSamples::Kind::partial) {
+  using enum BellSamples::Kind;
+  if (samples.kind == core || samples.kind == partial || samples.kind == clipped) {
     waiting_.push_back(samples);
     if (waiting_.size() == most_bells) fit_waiting();
     return;
@@ -36,12 +37,12 @@ void WidthMeter::add(int x, int y) {
 
 void WidthMeter::fit_waiting() {
   using enum BellSamples::Kind;
-  for (const BellSamples::Kind kind : {core, partial}) {
+  for (const BellSamples::Kind kind : {core, partial, clipped}) {
     bells_.clear();
     for (const BellSamples& samples : waiting_)
       if (samples.kind == kind) reader_.add_to(bells_, samples);
     if (bells_.count() == 0) continue;
-    bells_.fit_widths(kind == partial);
+    bells_.fit_widths(BellSamples::content_of(kind));
     for (int i = 0; i < bells_.count(); ++i) {
       const PlainBells::Fit bell = bells_[i];
       if (bell.converged)
