@@ -33,13 +33,29 @@ inline constexpr int default_pupils = 3000;
 /// \throws Error no_result  if no stripe passes in the frames
 LearnedStripe learn_stripe(std::span<const Frames> cameras, int most_pixels = default_pupils);
 
-/// The same from the frames before `end` alone. Frames are told apart from dropped ones by nothing else.
-/// \param end  a next_lesson(); if it is the number of frames, there is no waiting for more
-/// \return nothing if too few pixels have seen the stripe by then
-std::optional<LearnedStripe> learn_stripe_early(std::span<const Frames> cameras, int end,
-                                                int most_pixels = default_pupils);
-
 /// The number of frames after which learning is tried again, when it was tried in vain after `end` (or 0) frames.
 int next_lesson(int end);
+
+class PupilSearch;
+
+/// The same while the frames arrive.
+class StripeLearner {
+ public:
+  explicit StripeLearner(int most_pixels = default_pupils);
+  ~StripeLearner();
+
+  /// From the frames before `end` alone. Frames are told apart from dropped ones by nothing else.
+  /// \param end  a next_lesson(), later than before; if it is the number of frames, there is no waiting for more
+  /// \return nothing if too few pixels have seen the stripe by then
+  /// \throws Error no_result  if no stripe passes in all frames
+  std::optional<LearnedStripe> learn(std::span<const Frames> cameras, int end);
+  /// When there will be no more frames.
+  /// \param end  the next lesson that was not tried
+  LearnedStripe learn_from_all(std::span<const Frames> cameras, int end);
+
+ private:
+  int most_pixels_;
+  std::vector<PupilSearch> searches_;  ///< one a camera
+};
 
 }  // namespace pagesweep

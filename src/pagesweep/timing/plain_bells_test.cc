@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <span>
 #include <vector>
 
+#include "pagesweep/base/instruction_sets_testing.h"
 #include "pagesweep/timing/bell_fit.h"
 #include "pagesweep/timing/plain_bells_internal.h"
 #include "pagesweep/timing/row_windows_internal.h"
@@ -28,7 +30,7 @@ class PlainBellsTest : public ::testing::Test {
  protected:
   static constexpr int count = 160;
   const StripeProfile profile = make_profile();
-  const SensorNoise noise{.read_variance = 1.5, .gain = 0.03};
+  const SensorNoise noise{.read_variance = 1.5, .gain = 0.03, .ceiling = 60};
   const double reach = reach_around(profile);
   BellTables tables{profile, reach};
   PlainBells bells{tables, noise, profile.full_width_half_maximum()};
@@ -67,6 +69,18 @@ class PlainBellsTest : public ::testing::Test {
     bells.fit(partial ? Content::partial : Content::whole);
   }
 
+  /// Clips all samples above the noise's ceiling; amplitudes are 20 to 200. \return how many of each pixel
+  std::array<int, most_bells> clip() {
+    std::array<int, most_bells> clipped{};
+    for (std::size_t p = 0; p < most_bells; ++p)
+      for (float& sample : gray[p])
+        if (static_cast<double>(sample) > noise.ceiling) {
+          sample = std::numeric_limits<float>::infinity();
+          ++clipped[p];
+        }
+    return clipped;
+  }
+
   /// The scalar way, over the samples that the vectors' last step saw.
   BellFit fit_alone(int p, int frames_around, const Bell& start, BellUnknowns unknowns = BellUnknowns::basic) const {
     const auto& samples = gray[static_cast<std::size_t>(p)];
@@ -100,21 +114,16 @@ class PlainBellsTest : public ::testing::Test {
 
 TEST_F(PlainBellsTest, AgreesWithTheScalarFitOnEveryInstructionSet) {
   make(80);
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  on_every_instruction_set([&] {
     fit(false);
     expect_agreement();
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_F(PlainBellsTest, WidthsAgreeWithTheScalarFitOnEveryInstructionSet) {
   make(80, 11);
   tables.cover({1 / widest_stripe, widest_stripe});
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  on_every_instruction_set([&] {
     // The second time, the first step already sees the samples that the last one sees.
     std::array<float, most_bells> widths{};
     for (int round = 0; round < 2; ++round) {
@@ -136,14 +145,87 @@ TEST_F(PlainBellsTest, WidthsAgreeWithTheScalarFitOnEveryInstructionSet) {
       // A bell between two frames may have been moved on by the last step, and lose one sample of noise for another.
       EXPECT_NEAR(bells[p].chi_square, slow.chi_square, 9);
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_F(PlainBellsTest, AgreesWhereFramesWereDropped) {
   make(80, 7);
   fit(true);
   expect_agreement();
+}
+
+TEST_F(PlainBellsTest, ClippedBellsAgreeWithTheScalarFitOnEveryInstructionSet) {
+  make(80);
+  const auto clipped = clip();
+  ASSERT_EQ(clipped.front(), 0);
+  ASSERT_GT(clipped.back(), 10);
+  on_every_instruction_set([&] {
+    bells.clear();
+    for (int p = 0; p < most_bells; ++p) {
+      add(p, static_cast<float>(std::log(truth[static_cast<std::size_t>(p)].width)));
+      bells.start_at(static_cast<float>(p % 3 - 1));
+    }
+    bells.fit(Content::clipped);
+    for (int p = 0; p < most_bells; ++p) {
+      SCOPED_TRACE(p);
+      const Bell& bell = truth[static_cast<std::size_t>(p)];
+      const BellFit slow = fit_alone(p, bells.table(std::log(bell.width)).reach, bell);
+      ASSERT_TRUE(bells[p].converged);
+      ASSERT_TRUE(slow.converged);
+      EXPECT_NEAR(bells[p].time, slow.bell.time, 0.1 * slow.time_sigma());
+      EXPECT_NEAR(bells[p].time_sigma, slow.time_sigma(), 0.02 * slow.time_sigma());
+      EXPECT_NEAR(bells[p].amplitude, slow.bell.amplitude, 0.1 * std::sqrt(slow.covariance(0, 0)));
+      // The last step takes no more than what it is small enough for.
+      EXPECT_NEAR(bells[p].chi_square, slow.chi_square, 0.02 * slow.chi_square);
+      EXPECT_EQ(bells[p].samples, slow.samples);
+    }
+  });
+}
+
+TEST_F(PlainBellsTest, CoresOnCurvedBackgroundsAgreeWithTheScalarFitOnEveryInstructionSet) {
+  make(80);
+  // Light from elsewhere, as much as a third of the brightest bell and more than the darkest.
+  for (int p = 0; p < most_bells; ++p)
+    for (int i = 0; i < count; ++i) {
+      const double after = (i - truth[static_cast<std::size_t>(p)].time - 15) / 12;
+      gray[static_cast<std::size_t>(p)][static_cast<std::size_t>(count + i)] +=
+          static_cast<float>(60 * std::exp(-0.5 * after * after));
+    }
+  const double fwhm = profile.full_width_half_maximum();
+  on_every_instruction_set([&] {
+    bells.clear();
+    for (int p = 0; p < most_bells; ++p) {
+      const Bell& bell = truth[static_cast<std::size_t>(p)];
+      add(p, static_cast<float>(std::log(bell.width)));
+      PlainBells::Fit start;
+      start.time = bell.time + 0.4;
+      start.amplitude = 1.2 * bell.amplitude;
+      start.background = bell.background;
+      bells.start_at(start);
+    }
+    bells.fit_on_curved();
+    for (int p = 0; p < most_bells; ++p) {
+      SCOPED_TRACE(p);
+      Bell start = truth[static_cast<std::size_t>(p)];
+      start.time += 0.4;
+      const double core = core_widths * fwhm * start.width;
+      const int begin = static_cast<int>(std::ceil(start.time - core));
+      const int end = static_cast<int>(std::floor(start.time + core)) + 1;
+      const BellFit slow =
+          fit_bell(std::span(gray[static_cast<std::size_t>(p)])
+                       .subspan(static_cast<std::size_t>(count + begin), static_cast<std::size_t>(end - begin)),
+                   begin, profile, noise, start, {.unknowns = BellUnknowns::curved_background});
+      ASSERT_TRUE(bells[p].converged);
+      ASSERT_TRUE(slow.converged);
+      EXPECT_NEAR(bells[p].time, slow.bell.time, 0.1 * slow.time_sigma());
+      EXPECT_NEAR(bells[p].time_sigma, slow.time_sigma(), 0.03 * slow.time_sigma());
+      EXPECT_NEAR(bells[p].amplitude, slow.bell.amplitude, 0.1 * std::sqrt(slow.covariance(0, 0)));
+      EXPECT_NEAR(bells[p].slope, slow.bell.slope, 0.1 * std::sqrt(slow.covariance(3, 3)));
+      EXPECT_NEAR(bells[p].curvature, slow.bell.curvature, 0.1 * std::sqrt(slow.covariance(4, 4)));
+      EXPECT_NEAR(bells[p].chi_square, slow.chi_square, 0.02 * slow.chi_square);
+      EXPECT_EQ(bells[p].samples, slow.samples);
+    }
+  });
 }
 
 TEST_F(PlainBellsTest, AgreesAtTheEndsOfTheRecording) {

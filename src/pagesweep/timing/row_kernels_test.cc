@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "pagesweep/base/instruction_sets_testing.h"
 #include "pagesweep/timing/row_kernels_internal.h"
 #include "pagesweep/timing/stripe_pixel_testing.h"
 
@@ -32,23 +32,13 @@ class RowKernels : public ::testing::Test {
     }
     for (const auto& row : values) rows.push_back(row.data());
   }
-  ~RowKernels() override { hwy::SetSupportedTargetsForTest(0); }
-
-  template <class Body>
-  static void on_every_target(const Body& body) {
-    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      SCOPED_TRACE(hwy::TargetName(target));
-      hwy::SetSupportedTargetsForTest(target);
-      body();
-    }
-  }
 };
 
 using Depths = ::testing::Types<std::uint8_t, std::uint16_t>;
 TYPED_TEST_SUITE(RowKernels, Depths);
 
 TYPED_TEST(RowKernels, SumsAreExact) {
-  this->on_every_target([&] {
+  on_every_instruction_set([&] {
     std::vector<float> sums(this->width - this->left);
     sum_rows(std::span<const TypeParam* const>(this->rows), this->left, 0.5F, sums);
     for (int x = 0; x < this->width - this->left; ++x) {
@@ -60,7 +50,7 @@ TYPED_TEST(RowKernels, SumsAreExact) {
 }
 
 TYPED_TEST(RowKernels, TransposedSamplesAreThoseOfTheRows) {
-  this->on_every_target([&] {
+  on_every_instruction_set([&] {
     constexpr std::size_t stride = 48;
     std::vector<TypeParam> tile(tile_pixels * stride);
     transpose_rows(std::span<const TypeParam* const>(this->rows), this->left, tile.data(), stride);
@@ -71,7 +61,7 @@ TYPED_TEST(RowKernels, TransposedSamplesAreThoseOfTheRows) {
 }
 
 TYPED_TEST(RowKernels, ClippedSamplesAreCounted) {
-  this->on_every_target([&] {
+  on_every_instruction_set([&] {
     const auto saturation = static_cast<TypeParam>(std::numeric_limits<TypeParam>::max() / 3);
     std::vector<std::uint8_t> counts(this->width, 7);
     counts[1] = 250;
@@ -85,7 +75,7 @@ TYPED_TEST(RowKernels, ClippedSamplesAreCounted) {
 }
 
 TYPED_TEST(RowKernels, TheBlackLevelIsTakenOffAndTheHighestKnown) {
-  this->on_every_target([&] {
+  on_every_instruction_set([&] {
     const auto& gray = this->values[7];
     std::vector<float> light(gray.size());
     for (const std::size_t count : {gray.size(), gray.size() - 3, std::size_t{1}}) {
@@ -117,9 +107,7 @@ TEST(KeepHighest, RemembersTheHighestAndThoseBesideIt) {
     return 2 * (rows.middle[0][x] + rows.middle[1][x]) -
            ((rows.side[0][x] + rows.side[1][x]) + (rows.side[2][x] + rows.side[3][x]));
   };
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  on_every_instruction_set([&] {
     std::vector<float> rise(count, -std::numeric_limits<float>::infinity());
     std::vector<float> before(count, nan), after(count, nan);
     std::vector<std::int32_t> best(count, -1);
@@ -139,8 +127,7 @@ TEST(KeepHighest, RemembersTheHighestAndThoseBesideIt) {
       EXPECT_TRUE(highest == 0 ? std::isnan(before[x]) : before[x] == response(highest - 1, x)) << x;
       EXPECT_TRUE(highest + 1 == places ? std::isnan(after[x]) : after[x] == response(highest + 1, x)) << x;
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST(ExtremesOf, AreThoseOfAllPixels) {
@@ -150,16 +137,13 @@ TEST(ExtremesOf, AreThoseOfAllPixels) {
     rise.push_back(static_cast<float>(testing::uniform(3, x)));
     best.push_back(static_cast<std::int32_t>(100 * testing::uniform(4, x)));
   }
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  on_every_instruction_set([&] {
     for (std::size_t count = 1; count <= rise.size(); ++count) {
       const Extremes extremes = extremes_of(rise.data(), best.data(), count);
       EXPECT_EQ(extremes.lowest_rise, *std::min_element(rise.begin(), rise.begin() + static_cast<int>(count)));
       EXPECT_EQ(extremes.latest_best, *std::max_element(best.begin(), best.begin() + static_cast<int>(count)));
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 }  // namespace

@@ -28,7 +28,10 @@ struct TimeStream::Learned {
 };
 
 TimeStream::TimeStream(const std::vector<Sequence>& sequences, const TimingOptions& options)
-    : options_(options), arrived_(sequences.size(), 0), next_lesson_(next_lesson(0)) {
+    : options_(options),
+      arrived_(sequences.size(), 0),
+      next_lesson_(next_lesson(0)),
+      learner_(std::make_unique<StripeLearner>()) {
   if (sequences.empty()) throw std::invalid_argument("TimeStream: at least one camera is needed");
   for (const Sequence& sequence : sequences) frames_.emplace_back(sequence);
   follows_ = std::ranges::all_of(
@@ -55,8 +58,9 @@ void TimeStream::add(FrameSet set) {
 }
 
 void TimeStream::learn(int end) {
-  auto stripe = learn_stripe_early(frames_, end);
+  auto stripe = learner_->learn(frames_, end);
   if (!stripe) return;
+  learner_.reset();
   learned_ = std::make_unique<Learned>(Learned{*std::move(stripe), {}});
   // One camera's frames make room for the next one's windows.
   for (std::size_t c = 0; c < frames_.size(); ++c) {
@@ -98,7 +102,7 @@ Timing TimeStream::finish(Progress& progress, std::optional<int> count) {
       progress.warn(fmt::format("{}: {} of {} frames were dropped", frames_[c].sequence().camera, dropped_frames(c),
                                 frames_[c].count()));
   if (!follows_) return estimate_times(frames_, options_, progress);
-  if (!learned_) learned_ = std::make_unique<Learned>(Learned{learn_stripe(frames_), {}});
+  if (!learned_) learned_ = std::make_unique<Learned>(Learned{learner_->learn_from_all(frames_, next_lesson_), {}});
   Timing timing{learned_->stripe.profile, learned_->stripe.noise, {}, {}};
   for (std::size_t c = 0; c < frames_.size(); ++c) {
     if (c == learned_->cameras.size()) follow_camera(c);

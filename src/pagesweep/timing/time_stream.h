@@ -10,6 +10,8 @@
 
 namespace pagesweep {
 
+class StripeLearner;
+
 /// Time values while the frames arrive: as estimate_times(), to the last bit, without ever holding the whole sequence.
 ///
 /// The first frames are kept until enough pixels have seen the stripe pass to learn it. From then on only the frames
@@ -56,9 +58,10 @@ class TimeStream {
   TimingOptions options_;
   bool follows_ = false;  ///< else all frames are kept
   std::vector<Frames> frames_;
-  std::vector<int> arrived_;  ///< frames of each camera
-  int next_lesson_ = 0;       ///< [frames]
-  int looked_at_ = 0;         ///< [frames]
+  std::vector<int> arrived_;                ///< frames of each camera
+  int next_lesson_ = 0;                     ///< [frames]
+  int looked_at_ = 0;                       ///< [frames]
+  std::unique_ptr<StripeLearner> learner_;  ///< until then
   std::unique_ptr<Learned> learned_;
   std::vector<Image<std::uint8_t>> clipped_;
 };
