@@ -4,11 +4,58 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <vector>
 
 #include "pagesweep/base/parallel.h"
 
+// Not worth their time to compile beside SSE4, AVX2 and AVX-512.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pagesweep/matching/agreement.cc"
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+#include <hwy/highway.h>
+
+#include "pagesweep/matching/picture_lookup_internal.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace pagesweep::HWY_NAMESPACE {
+namespace {
+
+/// Whether the matches of a row of pixels are clearly confirmed, one byte each: by all four pixels around their place,
+/// to within max_px.
+void ConfirmRow(const Correspondences& matches, const Correspondences& back, int y, double max_px,
+                std::uint8_t* confirmed) {
+  const Floats d;
+  const float *u = matches.u.row(y).data(), *v = matches.v.row(y).data();
+  const auto width = static_cast<std::size_t>(matches.width()), lanes = hn::Lanes(d);
+  const Vector row = set(static_cast<float>(y)), most = set(static_cast<float>(max_px * max_px));
+  const auto within = [](Vector p, int end) { return hn::Min(hn::Max(p, set(0)), set(static_cast<float>(end - 1))); };
+  for (std::size_t x = 0; x < width; x += lanes) {
+    const std::size_t first = std::min(x, width - lanes);  // the last ones once more
+    const Place place = place_at(hn::LoadU(d, u + first), hn::LoadU(d, v + first), back.width(), back.height());
+    const SideBySide pixels(back.width(), back.height(), place);
+    const auto miss = [&](const Image<float>& picture, Vector at, int end, Vector own) {
+      return hn::Sub(hn::Add(between(pixels.corners(picture.data()), place), hn::Sub(at, within(at, end))), own);
+    };
+    const Vector column = hn::Add(hn::Iota(d, 0), set(static_cast<float>(first)));
+    const Vector du = miss(back.u, place.u, back.width(), column), dv = miss(back.v, place.v, back.height(), row);
+    const Mask near = hn::And(place.inside, hn::Le(hn::MulAdd(du, du, hn::Mul(dv, dv)), most));
+    HWY_ALIGN float is_near[most_places];
+    hn::Store(hn::IfThenElseZero(near, set(1)), d, is_near);
+    for (std::size_t k = 0; k < lanes; ++k) confirmed[first + k] = is_near[k] > 0;
+  }
+}
+
+}  // namespace
+}  // namespace pagesweep::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace pagesweep {
 namespace {
+
+HWY_EXPORT(ConfirmRow);
 
 /// The pixels around a position and their bilinear weights.
 struct Cell {
@@ -64,11 +111,14 @@ bool is_confirmed(const Correspondences& matches, const Found& other, int x, int
 
 void judge(const Found& there, const Found& back, double max_px, const PixelSet* only) {
   Correspondences& matches = *there.matches;
+  const bool at_once = std::min(matches.width(), back.matches->width()) >= 16 && back.matches->height() >= 2;
   parallel_rows(matches.height(), [&](int y) {
     if (!any_takes_part(only, y)) return;
+    std::vector<std::uint8_t> clear(static_cast<std::size_t>(matches.width()));
+    if (at_once) HWY_DYNAMIC_DISPATCH(ConfirmRow)(matches, *back.matches, y, max_px, clear.data());
     for (int x = 0; x < matches.width(); ++x) {
       if (!takes_part(only, x, y) || (*there.status)(x, y) != PixelStatus::ok) continue;
-      const bool confirmed = is_confirmed(matches, back, x, y, max_px);
+      const bool confirmed = clear[static_cast<std::size_t>(x)] || is_confirmed(matches, back, x, y, max_px);
       matches.status(x, y) = confirmed ? PixelStatus::ok : PixelStatus::inconsistent;
     }
   });
@@ -83,3 +133,4 @@ void keep_agreeing(MatchPair& pair, const FoundStatus& found, double max_px, con
 }
 
 }  // namespace pagesweep
+#endif  // HWY_ONCE

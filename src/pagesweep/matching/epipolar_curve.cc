@@ -119,6 +119,7 @@ void sample(const EpipolarCurve& curve, CurveSamples& samples) {
 
 EpipolarGeometry::EpipolarGeometry(const RayTable& from, const RayTable& to, InverseDepthRange range)
     : from_rays_(&from),
+      to_rays_(&to),
       view_(to),
       to_from_from_(to.camera().cam_from_rig * from.camera().cam_from_rig.inverse()),
       range_(range) {}

@@ -109,7 +109,7 @@ void sample(const EpipolarCurve& curve, CurveSamples& samples);
 /// All epipolar curves of one camera in another.
 class EpipolarGeometry {
  public:
-  /// \param from   must outlive this
+  /// The cameras must outlive this.
   /// \param range  of depths in `from`
   EpipolarGeometry(const RayTable& from, const RayTable& to, InverseDepthRange range);
   /// The same for another range.
@@ -118,17 +118,23 @@ class EpipolarGeometry {
     geometry.range_ = range;
     return geometry;
   }
+  const RayTable& from() const { return *from_rays_; }
+  const RayTable& to() const { return *to_rays_; }
   EpipolarCurve curve(int x, int y) const;
   /// A pixel's direction (X/Z, Y/Z, 1), turned into the other camera's frame; NaN where the distortion has no inverse.
   Eigen::Vector3d direction(int x, int y) const {
     return to_from_from_.rotation * from_rays_->direction(x, y).homogeneous();
   }
+  const Eigen::Vector2d& ray(int x, int y) const {
+    return from_rays_->direction(x, y);
+  }  ///< (X/Z, Y/Z) in its own frame
+  const Eigen::Matrix3d& rotation() const { return to_from_from_.rotation; }   ///< into the other camera's
   const Eigen::Vector3d& origin() const { return to_from_from_.translation; }  ///< of all rays [mm] in that frame
   const View& view() const { return view_; }
   const InverseDepthRange& range() const { return range_; }
 
  private:
-  const RayTable* from_rays_;
+  const RayTable *from_rays_, *to_rays_;
   View view_;
   Rigid3 to_from_from_;
   InverseDepthRange range_;

@@ -13,145 +13,165 @@
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 #include <hwy/highway.h>
 
+#include "pagesweep/matching/picture_lookup_internal.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace pagesweep::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-using Floats = hn::CappedTag<float, most_curves>;
-using Integers = hn::RebindToSigned<Floats>;
-using Vector = hn::Vec<Floats>;
-using Mask = hn::Mask<Floats>;
-
-Vector set(float value) { return hn::Set(Floats(), value); }
-Vector no_number() { return set(std::numeric_limits<float>::quiet_NaN()); }
-
-/// Some of the batch's pixels.
-class Curves {
+/// The other camera's picture, asked at a vector of places.
+class Picture {
  public:
-  Curves(const CurveBatch& batch, std::size_t first) : batch_(batch), first_(first) {
-    for (std::size_t axis = 0; axis < 3; ++axis) direction_[axis] = load(batch.direction[axis]);
-    time_ = load(batch.time);
+  explicit Picture(const TimeArrays& times) : times_(times) {}
+
+  HWY_INLINE Place at(Vector u, Vector v) const { return place_at(u, v, times_.width, times_.height); }
+
+  /// Pixels is Scattered or SideBySide. NaN where pixels are missing; but where they are not linked, a value between.
+  template <class Pixels>
+  HWY_INLINE Vector time(const Place& place, const Pixels& pixels) const {
+    return hn::IfThenElse(place.inside, between(pixels.corners(times_.time), place), no_number());
   }
-  /// Places on one curve.
-  Curves(const CurveBatch& batch, const std::array<float, 3>& direction, float time) : batch_(batch), first_(0) {
-    for (std::size_t axis = 0; axis < 3; ++axis) direction_[axis] = set(direction[axis]);
-    time_ = set(time);
+  /// NaN there as well.
+  template <class Pixels>
+  HWY_INLINE Vector linked_time(const Place& place, const Pixels& pixels) const {
+    return hn::Add(time(place, pixels), pixels.pixel(times_.between));
   }
-
-  Vector load(const CurveBatch::Each<float>& values) const { return hn::LoadU(Floats(), &values[first_]); }
-  void store(Vector v, CurveBatch::Each<float>& values) const { hn::StoreU(v, Floats(), &values[first_]); }
-
-  /// A place on each curve, and the cell of pixels around it.
-  struct Place {
-    Vector u, v;  ///< [px]
-    hn::Vec<Integers> cell;
-    Vector right, down;  ///< [px] from the cell's first pixel
-    Mask imaged;         ///< by the lens, be it inside the picture or not
-    Mask seen;
-  };
-
-  HWY_INLINE Place at(Vector w) const {
-    const LensNumbers& lens = batch_.lens;
-    const Vector z = along(2, w), scale = hn::Div(set(1), z);
-    const Vector x = hn::Mul(along(0, w), scale), y = hn::Mul(along(1, w), scale);
-    const Vector xx = hn::Mul(x, x), yy = hn::Mul(y, y), xy2 = hn::Mul(set(2), hn::Mul(x, y)), rr = hn::Add(xx, yy);
-    const Vector radial =
-        hn::MulAdd(rr, hn::MulAdd(rr, hn::MulAdd(rr, set(lens.k3), set(lens.k2)), set(lens.k1)), set(1));
-    const Vector tangent_x = hn::MulAdd(set(lens.p1), xy2, hn::Mul(set(lens.p2), hn::MulAdd(set(2), xx, rr)));
-    const Vector tangent_y = hn::MulAdd(set(lens.p2), xy2, hn::Mul(set(lens.p1), hn::MulAdd(set(2), yy, rr)));
-    Place place;
-    place.u = hn::MulAdd(set(lens.fx), hn::MulAdd(x, radial, tangent_x), set(lens.cx));
-    place.v = hn::MulAdd(set(lens.fy), hn::MulAdd(y, radial, tangent_y), set(lens.cy));
-    const auto width = static_cast<float>(batch_.times.width), height = static_cast<float>(batch_.times.height);
-    const auto inside = [](Vector p, float end) { return hn::And(hn::Ge(p, set(-0.5f)), hn::Le(p, set(end - 0.5f))); };
-    place.imaged = hn::And(hn::Gt(z, set(0)), hn::Le(rr, set(lens.max_radius_squared)));
-    place.seen = hn::And(hn::And(inside(place.u, width), inside(place.v, height)), place.imaged);
-    // A place in the outer half pixel takes the outermost cell, and no less than its border.
-    const Vector column = hn::Min(hn::Max(hn::IfThenElseZero(place.seen, place.u), set(0)), set(width - 1));
-    const Vector row = hn::Min(hn::Max(hn::IfThenElseZero(place.seen, place.v), set(0)), set(height - 1));
-    const Vector left = hn::Min(hn::Floor(column), set(width - 2)), top = hn::Min(hn::Floor(row), set(height - 2));
-    place.right = hn::Sub(column, left);
-    place.down = hn::Sub(row, top);
-    const Integers integers;
-    place.cell = hn::Add(hn::Mul(hn::ConvertTo(integers, top), hn::Set(integers, batch_.times.width)),
-                         hn::ConvertTo(integers, left));
-    return place;
-  }
-
-  /// How far the other camera's time is ahead of the pixel's; NaN where there is none.
-  HWY_INLINE Vector ahead(const Place& place) const {
-    const Vector time = hn::Add(between(batch_.times.time, place), gather(batch_.times.between, place, 0));
-    return hn::IfThenElse(place.seen, hn::Sub(time, time_), no_number());
-  }
-  HWY_INLINE Vector ahead(Vector w) const { return ahead(at(w)); }
-
-  Vector amplitude(const Place& place) const { return between(batch_.times.amplitude, place); }
-
-  HWY_INLINE Vector variance(const Place& place) const {
-    const Vector left = hn::Sub(set(1), place.right), up = hn::Sub(set(1), place.down);
-    const int width = batch_.times.width;
-    const auto part = [&](int offset, Vector weight) {
-      const Vector sigma = hn::Mul(weight, gather(batch_.times.sigma, place, offset));
-      return hn::Mul(sigma, sigma);
-    };
-    return hn::Add(hn::Add(part(0, hn::Mul(left, up)), part(1, hn::Mul(place.right, up))),
-                   hn::Add(part(width, hn::Mul(left, place.down)), part(width + 1, hn::Mul(place.right, place.down))));
-  }
-
-  /// Inverse depth a pixel of the other picture, the lens taken as ideal.
-  HWY_INLINE Vector step(Vector w) const {
-    const Vector x = along(0, w), y = along(1, w), z = along(2, w);
-    const auto& [bx, by, bz] = batch_.origin;
-    const Vector du = hn::MulSub(set(bx), z, hn::Mul(x, set(bz))), dv = hn::MulSub(set(by), z, hn::Mul(y, set(bz)));
-    const Vector speed = hn::Mul(set(batch_.lens.fx), hn::Sqrt(hn::MulAdd(du, du, hn::Mul(dv, dv))));
-    return hn::Div(hn::Mul(z, z), speed);
-  }
-
-  Mask is_allowed(Vector w) const { return hn::And(hn::Ge(w, set(batch_.far)), hn::Le(w, set(batch_.near))); }
+  const TimeArrays& times() const { return times_; }
 
  private:
-  HWY_INLINE Vector along(std::size_t axis, Vector w) const {
-    return hn::MulAdd(w, set(batch_.origin[axis]), direction_[axis]);
-  }
-  static HWY_INLINE Vector gather(const float* values, const Place& place, int offset) {
-    return hn::GatherIndex(Floats(), values + offset, place.cell);
-  }
-  HWY_INLINE Vector between(const float* values, const Place& place) const {
-    const int width = batch_.times.width;
-    const Vector a = gather(values, place, 0), b = gather(values, place, 1);
-    const Vector c = gather(values, place, width), d = gather(values, place, width + 1);
-    const Vector upper = hn::MulAdd(place.right, hn::Sub(b, a), a), lower = hn::MulAdd(place.right, hn::Sub(d, c), c);
-    return hn::MulAdd(place.down, hn::Sub(lower, upper), upper);
-  }
-
-  const CurveBatch& batch_;
-  const std::size_t first_;
-  Vector direction_[3], time_;
+  const TimeArrays& times_;
 };
 
-/// The depth where the times are equal; NaN where secants do not lead there.
-HWY_INLINE Vector find_root(const Curves& curves, Vector expected) {
+/// From the four pixels' sigma.
+HWY_INLINE Vector variance(const Corners& sigma, const Place& place) {
+  const Vector left = hn::Sub(set(1), place.right), up = hn::Sub(set(1), place.down);
+  const auto part = [&](Vector own, Vector weight_x, Vector weight_y) {
+    const Vector weighted = hn::Mul(own, hn::Mul(weight_x, weight_y));
+    return hn::Mul(weighted, weighted);
+  };
+  return hn::Add(hn::Add(part(sigma.a, left, up), part(sigma.b, place.right, up)),
+                 hn::Add(part(sigma.c, left, place.down), part(sigma.d, place.right, place.down)));
+}
+
+struct Vector3 {
+  Vector x, y, z;
+};
+
+/// Where the lens images directions of the camera's frame.
+struct Imaged {
+  Vector u, v;  ///< [px]
+  Mask valid;   ///< as far as the lens is known
+};
+
+class Lens {
+ public:
+  explicit Lens(const LensNumbers& lens) : lens_(lens) {}
+
+  HWY_INLINE Imaged image(const Vector3& p) const {
+    const Vector scale = hn::Div(set(1), p.z), x = hn::Mul(p.x, scale), y = hn::Mul(p.y, scale);
+    const Vector xx = hn::Mul(x, x), yy = hn::Mul(y, y), xy2 = hn::Mul(set(2), hn::Mul(x, y)), rr = hn::Add(xx, yy);
+    const Vector tangent_x = hn::MulAdd(set(lens_.p1), xy2, hn::Mul(set(lens_.p2), hn::MulAdd(set(2), xx, rr)));
+    const Vector tangent_y = hn::MulAdd(set(lens_.p2), xy2, hn::Mul(set(lens_.p1), hn::MulAdd(set(2), yy, rr)));
+    const Vector radial = radial_at(rr);
+    return {hn::MulAdd(set(lens_.fx), hn::MulAdd(x, radial, tangent_x), set(lens_.cx)),
+            hn::MulAdd(set(lens_.fy), hn::MulAdd(y, radial, tangent_y), set(lens_.cy)),
+            hn::And(hn::Gt(p.z, set(0)), hn::Le(rr, set(lens_.max_radius_squared)))};
+  }
+
+  /// How the picture of p moves when p moves by a unit of `change`.
+  HWY_INLINE void move(const Vector3& p, const std::array<float, 3>& change, Vector& du, Vector& dv) const {
+    const Vector scale = hn::Div(set(1), p.z), x = hn::Mul(p.x, scale), y = hn::Mul(p.y, scale);
+    const Vector dx = hn::Mul(scale, hn::NegMulAdd(x, set(change[2]), set(change[0])));
+    const Vector dy = hn::Mul(scale, hn::NegMulAdd(y, set(change[2]), set(change[1])));
+    const Vector rr = hn::MulAdd(x, x, hn::Mul(y, y)), half_drr = hn::MulAdd(x, dx, hn::Mul(y, dy));
+    const Vector dxy = hn::MulAdd(x, dy, hn::Mul(y, dx)), radial = radial_at(rr);
+    const Vector slope = hn::MulAdd(rr, hn::MulAdd(rr, set(3 * lens_.k3), set(2 * lens_.k2)), set(lens_.k1));
+    const Vector dradial = hn::Mul(set(2), hn::Mul(half_drr, slope));
+    const auto tangential = [&](float same, float other, Vector q, Vector dq) {
+      const Vector drr = hn::MulAdd(hn::Mul(set(2), q), dq, half_drr);
+      return hn::MulAdd(set(2 * same), dxy, hn::Mul(set(2 * other), drr));
+    };
+    du = hn::Mul(set(lens_.fx), hn::MulAdd(dx, radial, hn::MulAdd(x, dradial, tangential(lens_.p1, lens_.p2, x, dx))));
+    dv = hn::Mul(set(lens_.fy), hn::MulAdd(dy, radial, hn::MulAdd(y, dradial, tangential(lens_.p2, lens_.p1, y, dy))));
+  }
+
+ private:
+  HWY_INLINE Vector radial_at(Vector rr) const {
+    return hn::MulAdd(rr, hn::MulAdd(rr, hn::MulAdd(rr, set(lens_.k3), set(lens_.k2)), set(lens_.k1)), set(1));
+  }
+
+  const LensNumbers& lens_;
+};
+
+/// The point at inverse depth w of a ray, up to scale.
+HWY_INLINE Vector3 point_at(const Vector3& direction, const std::array<float, 3>& origin, Vector w) {
+  return {hn::MulAdd(w, set(origin[0]), direction.x), hn::MulAdd(w, set(origin[1]), direction.y),
+          hn::MulAdd(w, set(origin[2]), direction.z)};
+}
+
+/// Some of the batch's pixels. Over the few pixels that are followed, their curves are straight: a lens bends them by
+/// less than a hundredth of a pixel there. Places are [px] from the expected one, towards nearer points.
+class Curves {
+ public:
+  static constexpr float farthest = 6;  ///< [px]
+
+  HWY_INLINE Curves(const CurveBatch& batch, std::size_t first) : picture_(batch.times), time_(at(batch.time, first)) {
+    const Vector x = at(batch.ray_x, first), y = at(batch.ray_y, first), expected = at(batch.expected, first);
+    const auto row = [&](std::size_t i) {
+      const auto& r = batch.rotation;
+      return hn::MulAdd(set(r[i]), x, hn::MulAdd(set(r[i + 1]), y, set(r[i + 2])));
+    };
+    const Vector3 point = point_at({row(0), row(3), row(6)}, batch.origin, expected);
+    const Lens lens(batch.lens);
+    const Imaged imaged = lens.image(point);
+    lens.move(point, batch.origin, du_, dv_);
+    inverse_speed_ = hn::Div(set(1), hn::Sqrt(hn::MulAdd(du_, du_, hn::Mul(dv_, dv_))));
+    du_ = hn::Mul(du_, inverse_speed_);
+    dv_ = hn::Mul(dv_, inverse_speed_);
+    u_ = hn::IfThenElse(imaged.valid, imaged.u, no_number());
+    v_ = imaged.v;
+    expected_ = expected;
+  }
+
+  static HWY_INLINE Vector at(const CurveBatch::Each<float>& values, std::size_t first) {
+    return hn::LoadU(Floats(), &values[first]);
+  }
+  HWY_INLINE Place place(Vector s) const { return picture_.at(hn::MulAdd(s, du_, u_), hn::MulAdd(s, dv_, v_)); }
+  HWY_INLINE Vector inverse_depth(Vector s) const { return hn::MulAdd(s, inverse_speed_, expected_); }
+  /// How far the other camera's time is ahead of the pixel's; NaN where there is none.
+  HWY_INLINE Vector ahead(Vector s) const {
+    const Place there = place(s);
+    return hn::Sub(picture_.time(there, SideBySide(picture_.times().width, picture_.times().height, there)), time_);
+  }
+  const Picture& picture() const { return picture_; }
+
+ private:
+  const Picture picture_;
+  Vector time_, u_, v_, du_, dv_, expected_, inverse_speed_;
+};
+
+/// The place where the times are equal; NaN where secants do not lead there.
+HWY_INLINE Vector find_root(const Curves& curves, Vector slope) {
   const Floats d;
-  const Vector step = curves.step(expected), precise = hn::Mul(set(1e-3f), step);
-  Vector before = expected, at_before = curves.ahead(before);
-  Vector here = hn::Add(expected, step), at_here = curves.ahead(here);
-  const auto secant = [&] { return hn::Div(hn::Mul(at_here, hn::Sub(before, here)), hn::Sub(at_here, at_before)); };
+  Vector before = set(0), at_before = curves.ahead(before);
+  if (!hn::AllTrue(d, hn::Or(hn::Eq(slope, slope), hn::IsNaN(at_before))))
+    slope = hn::IfThenElse(hn::Eq(slope, slope), slope, hn::Sub(curves.ahead(set(1)), at_before));
   // The neighbourhood predicts the place, give or take half as much and half a pixel. What leads elsewhere is left out.
-  const Vector middle = hn::Add(here, secant());
-  const Vector reach = hn::Mul(set(0.5f), hn::Add(step, hn::Abs(hn::Sub(middle, expected))));
-  const Vector most = hn::Mul(set(6), step);
-  Vector root = no_number();
+  const Vector middle = hn::Neg(hn::Div(at_before, slope));
+  const Vector reach = hn::MulAdd(set(0.5f), hn::Abs(middle), set(0.5f));
+  const auto is_near = [&](Vector s) {
+    return hn::And(hn::Le(hn::Abs(hn::Sub(s, middle)), reach), hn::Le(hn::Abs(s), set(Curves::farthest)));
+  };
+  constexpr float precise = 5e-3f;  // [px]
+  Vector here = hn::IfThenElse(is_near(middle), middle, no_number()), root = no_number();
   for (int tries = 0; tries < 6; ++tries) {
-    const Vector move = secant(), next = hn::Add(here, move);
-    const auto near =
-        hn::And(hn::Le(hn::Abs(hn::Sub(next, middle)), reach), hn::Le(hn::Abs(hn::Sub(next, expected)), most));
-    const auto arrived = hn::And(near, hn::Lt(hn::Abs(move), precise));
+    const Vector at_here = curves.ahead(here);
+    const Vector secant = hn::Div(hn::Mul(at_here, hn::Sub(before, here)), hn::Sub(at_here, at_before));
+    const Vector move = hn::IfThenZeroElse(hn::Eq(at_here, set(0)), secant), next = hn::Add(here, move);
+    const Mask near = is_near(next), arrived = hn::And(near, hn::Lt(hn::Abs(move), set(precise)));
     root = hn::IfThenElse(hn::And(arrived, hn::IsNaN(root)), next, root);
     before = here;
     at_before = at_here;
-    here = hn::IfThenElse(near, next, no_number());
-    if (hn::AllTrue(d, hn::Or(hn::Eq(root, root), hn::IsNaN(here)))) break;
-    at_here = curves.ahead(here);
+    here = hn::IfThenElse(hn::AndNot(arrived, near), next, no_number());
+    if (hn::AllTrue(d, hn::IsNaN(here))) break;
   }
   return root;
 }
@@ -160,35 +180,48 @@ void FollowCurves(CurveBatch& batch) {
   const Floats d;
   for (std::size_t first = 0; first < most_curves; first += hn::Lanes(d)) {
     const Curves curves(batch, first);
-    const Vector root = find_root(curves, curves.load(batch.expected));
-    const auto place = curves.at(root);
-    const Vector step = curves.step(root);
-    const Vector at_before = curves.ahead(hn::Sub(root, step)), at_behind = curves.ahead(hn::Add(root, step));
+    const auto load = [&](const CurveBatch::Each<float>& values) { return Curves::at(values, first); };
+    const auto store = [&](Vector v, CurveBatch::Each<float>& values) { hn::StoreU(v, d, &values[first]); };
+    const Vector root = find_root(curves, load(batch.expected_slope)), inverse_depth = curves.inverse_depth(root);
+    const Picture& picture = curves.picture();
+    const Place place = curves.place(root);
+    const auto time_at = [&](float px) {
+      const Place there = curves.place(hn::Add(root, set(px)));
+      return picture.linked_time(there, SideBySide(batch.times.width, batch.times.height, there));
+    };
     // Over two pixels: over less, noise would be taken for slope. NaN beside a gap or the border.
-    const Vector slope = hn::Mul(set(0.5f), hn::Sub(at_behind, at_before));
-    const Vector contrast =
-        hn::Div(curves.amplitude(place), hn::Mul(set(batch.brightness), curves.load(batch.amplitude)));
+    const SideBySide pixels(batch.times.width, batch.times.height, place);
+    const Vector linked = pixels.pixel(batch.times.between);
+    const Vector slope = hn::MulAdd(set(0.5f), hn::Sub(time_at(1), time_at(-1)), linked);
+    const Vector sigma = load(batch.sigma),
+                 noise = hn::MulAdd(sigma, sigma, variance(pixels.corners(batch.times.sigma), place));
+    const Vector contrast = hn::Div(between(pixels.corners(batch.times.amplitude), place),
+                                    hn::Mul(set(batch.brightness), load(batch.amplitude)));
     const auto is_alike =
         hn::And(hn::Lt(contrast, set(batch.most_contrast)), hn::Gt(contrast, set(1 / batch.most_contrast)));
-    const auto is_good = hn::And(hn::And(curves.is_allowed(root), is_alike), hn::Eq(slope, slope));
-    curves.store(hn::IfThenElse(is_good, root, no_number()), batch.inverse_depth);
-    curves.store(place.u, batch.u);
-    curves.store(place.v, batch.v);
-    curves.store(slope, batch.slope);
-    curves.store(curves.variance(place), batch.variance);
+    const auto is_allowed = hn::And(hn::Ge(inverse_depth, set(batch.far)), hn::Le(inverse_depth, set(batch.near)));
+    const auto is_good = hn::And(hn::And(is_allowed, is_alike), hn::Eq(slope, slope));
+    store(hn::IfThenElse(is_good, inverse_depth, no_number()), batch.inverse_depth);
+    store(place.u, batch.u);
+    store(place.v, batch.v);
+    store(slope, batch.slope);
+    store(hn::Div(hn::Sqrt(noise), hn::Abs(slope)), batch.sigma_px);
   }
 }
 
 /// Places on one curve, a stretch of them at a time.
 class CurveSearch {
  public:
-  CurveSearch(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,
-              std::size_t count)
-      : curves_(batch, direction, time), times_(batch.times), time_(time), first_(first), step_(step), count_(count) {}
+  CurveSearch(const TimeArrays& times, const LensNumbers& lens, const CurvePlaces& line, float time)
+      : picture_(times),
+        lens_(lens),
+        line_(line),
+        direction_{set(line.direction[0]), set(line.direction[1]), set(line.direction[2])},
+        time_(time) {}
 
   /// Looks closely where the time may be that is looked for, and else nowhere.
   bool operator()(std::vector<std::size_t>& changes) const {
-    const std::size_t stretches = (count_ + stretch - 1) / stretch, at_once = hn::Lanes(Floats()) - 1;
+    const std::size_t stretches = (line_.count + stretch - 1) / stretch, at_once = hn::Lanes(Floats()) - 1;
     bool seen = false;
     for (std::size_t i = 0; i < stretches; i += at_once) {
       const Promise promise = look_over(i);
@@ -205,14 +238,18 @@ class CurveSearch {
   /// place is farther than a block from its stretch's middle, be the curve a little bent.
   static constexpr float farthest = 17;
 
-  Curves::Place place_at(Vector k) const {
-    return curves_.at(hn::MulAdd(hn::Min(k, set(static_cast<float>(count_))), set(step_), set(first_)));
+  HWY_INLINE Imaged image(Vector k) const {
+    const Vector w = hn::MulAdd(hn::Min(k, set(static_cast<float>(line_.count))), set(line_.step), set(line_.first));
+    return lens_.image(point_at(direction_, line_.origin, w));
+  }
+  HWY_INLINE Place place_of(const Imaged& imaged) const {
+    return picture_.at(hn::IfThenElse(imaged.valid, imaged.u, no_number()), imaged.v);
   }
 
   bool sees_any() const {
     bool seen = false;
-    for (std::size_t k = 0; k <= count_ && !seen; k += hn::Lanes(Floats()))
-      seen = !hn::AllFalse(Floats(), place_at(hn::Iota(Floats(), static_cast<float>(k))).seen);
+    for (std::size_t k = 0; k <= line_.count && !seen; k += hn::Lanes(Floats()))
+      seen = !hn::AllFalse(Floats(), place_of(image(hn::Iota(Floats(), static_cast<float>(k)))).inside);
     return seen;
   }
 
@@ -226,33 +263,34 @@ class CurveSearch {
     const Floats d;
     constexpr auto length = static_cast<float>(stretch);
     const Vector index = hn::Add(hn::Iota(d, 0), set(static_cast<float>(first)));
-    const auto place = place_at(hn::MulAdd(index, set(length), set(0.5f * length)));
+    const Imaged middle = image(hn::MulAdd(index, set(length), set(0.5f * length)));
     HWY_ALIGN float u[most_curves + 1], v[most_curves + 1];
-    hn::StoreU(place.u, d, u);
-    hn::StoreU(place.v, d, v);
+    hn::StoreU(middle.u, d, u);
+    hn::StoreU(middle.v, d, v);
     u[hn::Lanes(d)] = v[hn::Lanes(d)] = 0;
     const auto near = [&](const float* p, Vector here) {
       return hn::Le(hn::Abs(hn::Sub(hn::LoadU(d, p + 1), here)), set(farthest));
     };
-    const Mask even = hn::And(hn::And(near(u, place.u), near(v, place.v)), place.imaged);
-    const Mask hopeful = hn::Or(may_have_time(place), hn::Not(even));
+    const Mask even = hn::And(hn::And(near(u, middle.u), near(v, middle.v)), middle.valid);
+    const Mask hopeful = hn::Or(may_have_time(middle), hn::Not(even));
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, hopeful, bits);
-    return {static_cast<unsigned>(bits[0] | bits[1] << 8), !hn::AllFalse(d, place.seen)};
+    return {static_cast<unsigned>(bits[0] | bits[1] << 8), !hn::AllFalse(d, place_of(middle).inside)};
   }
 
   /// \return where the blocks around a place have times before and after
-  Mask may_have_time(const Curves::Place& place) const {
+  HWY_INLINE Mask may_have_time(const Imaged& place) const {
     const Integers d;
     constexpr float share = 1.0f / time_block_px, rounding = 1e-3f;  // [frames]
-    const int rows = (times_.height + time_block_px - 1) / time_block_px;
+    const int rows = (picture_.times().height + time_block_px - 1) / time_block_px;
     const auto block = [&](Vector p, int blocks) {
       const Vector inside = hn::Min(hn::Max(hn::Mul(p, set(share)), set(0)), set(static_cast<float>(blocks - 1)));
-      return hn::ConvertTo(d, hn::IfThenElseZero(place.imaged, inside));
+      return hn::ConvertTo(d, hn::IfThenElseZero(place.valid, inside));
     };
-    const auto index = hn::Add(hn::Mul(block(place.v, rows), hn::Set(d, times_.blocks)), block(place.u, times_.blocks));
-    return hn::And(hn::Le(hn::GatherIndex(Floats(), times_.earliest, index), set(time_ + rounding)),
-                   hn::Ge(hn::GatherIndex(Floats(), times_.latest, index), set(time_ - rounding)));
+    const auto index = hn::Add(hn::Mul(block(place.v, rows), hn::Set(d, picture_.times().blocks)),
+                               block(place.u, picture_.times().blocks));
+    return hn::And(hn::Le(hn::GatherIndex(Floats(), picture_.times().earliest, index), set(time_ + rounding)),
+                   hn::Ge(hn::GatherIndex(Floats(), picture_.times().latest, index), set(time_ - rounding)));
   }
 
   /// \return whether any of the places of a stretch is seen
@@ -261,26 +299,28 @@ class CurveSearch {
     bool seen = false;
     HWY_ALIGN float ahead[most_curves];
     for (std::size_t k = 0; k < most_curves; k += hn::Lanes(d)) {
-      const auto place = place_at(hn::Iota(d, static_cast<float>(first + k)));
-      seen = seen || !hn::AllFalse(d, place.seen);
-      hn::StoreU(curves_.ahead(place), d, ahead + k);
+      const Place place = place_of(image(hn::Iota(d, static_cast<float>(first + k))));
+      seen = seen || !hn::AllFalse(d, place.inside);
+      hn::StoreU(hn::Sub(picture_.linked_time(place, Scattered(picture_.times().width, place)), set(time_)), d,
+                 ahead + k);
     }
-    const std::size_t steps = std::min(stretch, count_ - first);
+    const std::size_t steps = std::min(stretch, line_.count - first);
     for (std::size_t k = 0; k < steps; ++k)
       if (ahead[k] * ahead[k + 1] <= 0) changes.push_back(first + k);
     return seen;
   }
 
-  Curves curves_;
-  const TimeArrays& times_;
-  float time_, first_, step_;
-  std::size_t count_;
+  const Picture picture_;
+  const Lens lens_;
+  const CurvePlaces& line_;
+  const Vector3 direction_;
+  const float time_;
 };
 
-bool SearchCurve(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,
-                 std::size_t count, std::vector<std::size_t>& changes) {
+bool SearchCurve(const TimeArrays& times, const LensNumbers& lens, const CurvePlaces& line, float time,
+                 std::vector<std::size_t>& changes) {
   changes.clear();
-  return CurveSearch(batch, direction, time, first, step, count)(changes);
+  return CurveSearch(times, lens, line, time)(changes);
 }
 
 }  // namespace pagesweep::HWY_NAMESPACE
@@ -294,9 +334,9 @@ HWY_EXPORT(SearchCurve);
 
 void follow_curves(CurveBatch& batch) { HWY_DYNAMIC_DISPATCH(FollowCurves)(batch); }
 
-bool search_curve(const CurveBatch& batch, const std::array<float, 3>& direction, float time, float first, float step,
-                  std::size_t count, std::vector<std::size_t>& changes) {
-  return HWY_DYNAMIC_DISPATCH(SearchCurve)(batch, direction, time, first, step, count, changes);
+bool search_curve(const TimeArrays& times, const LensNumbers& lens, const CurvePlaces& line, float time,
+                  std::vector<std::size_t>& changes) {
+  return HWY_DYNAMIC_DISPATCH(SearchCurve)(times, lens, line, time, changes);
 }
 
 }  // namespace pagesweep

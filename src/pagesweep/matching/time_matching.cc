@@ -1,89 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pagesweep/matching/time_matching.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
-#include <functional>
-#include <limits>
 #include <memory>
-#include <optional>
 #include <stdexcept>
-#include <utility>
 #include <vector>
+
+#include "pagesweep/matching/time_finder_internal.h"
 
 namespace pagesweep {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double tolerance_px = 1e-4;
-
-/// How far the other camera's time, along one curve, is ahead of one pixel's.
-struct TimeDifference {
-  const TimeField* field;
-  const EpipolarCurve* curve;
-  double time;
-
-  /// [frames] NaN where the other camera has no time, or does not see.
-  double operator()(double w) const {
-    if (!curve->contains(w)) return nan;
-    const auto pixel = curve->at(w);
-    return pixel ? field->time_at(*pixel) - time : nan;
-  }
-};
-
-/// A place where the difference may vanish: its sign changes from `low` to `high`.
-struct Bracket {
-  double low, high;
-  double at_low, at_high;
-};
-
-/// Root within a bracket by regula falsi (Illinois), nothing if it closes around a gap of the time map.
-std::optional<double> solve(const TimeDifference& difference, Bracket b, double step) {
-  for (int i = 0; i < 40; ++i) {
-    const double w = b.low - b.at_low * (b.high - b.low) / (b.at_high - b.at_low);
-    const double value = difference(w);
-    if (std::isnan(value)) return std::nullopt;
-    if (value == 0 || std::abs(b.high - b.low) < tolerance_px * step) return w;
-    if ((value > 0) == (b.at_low > 0)) {
-      if (std::abs(w - b.low) < tolerance_px * step) return w;
-      b.low = w;
-      b.at_low = value;
-      b.at_high /= 2;
-    } else {
-      if (std::abs(w - b.high) < tolerance_px * step) return w;
-      b.high = w;
-      b.at_high = value;
-      b.at_low /= 2;
-    }
-  }
-  return std::nullopt;
-}
-
-/// Root near the left neighbour's depth: steps downhill from there until the sign changes.
-std::optional<double> follow(const TimeDifference& difference, double expected, double step) {
-  constexpr double reach_px = 6;
-  double w = expected, here = difference(expected), ahead = difference(expected + step);
-  if (here == 0) return expected;
-  if (!((here > 0) == (ahead > 0))) return solve(difference, {expected, expected + step, here, ahead}, step);
-  double slope = ahead - here;  // [frames/px]
-  for (int tries = 0; tries < 4; ++tries) {
-    const double distance = -here / slope;  // [px] as the neighbourhood predicts
-    const double next = w + (distance + std::copysign(0.3, distance)) * step;
-    if (!(std::abs(next - expected) < reach_px * step)) return std::nullopt;  // NaN, too
-    const double there = difference(next);
-    if (std::isnan(there)) return std::nullopt;
-    if ((there > 0) != (here > 0)) return solve(difference, {w, next, here, there}, step);
-    if (!(std::abs(there) < std::abs(here))) return std::nullopt;  // no way down here
-    slope = (there - here) * step / (next - w);
-    w = next;
-    here = there;
-  }
-  return std::nullopt;
-}
-
 /// Median amplitude of a camera's pixels; 1 if there are none.
 double usual_amplitude(const TimeMap& map) {
+  constexpr std::size_t stride = 61;
   std::vector<float> amplitudes;
-  for (std::size_t i = 0; i < map.status.size(); i += 7)
+  for (std::size_t i = 0; i < map.status.size(); i += stride)
     if (map.status.data()[i] == PixelStatus::ok && map.amplitude.data()[i] > 0)
       amplitudes.push_back(map.amplitude.data()[i]);
   if (amplitudes.empty()) return 1;
@@ -92,95 +26,146 @@ double usual_amplitude(const TimeMap& map) {
   return *middle;
 }
 
-/// A camera's times as the other one's pixels look for theirs in it.
-struct SearchedMap {
-  const TimeField* field;
-  double brightness;    ///< of this camera's pixels over those of the camera that searches
-  double max_sigma_px;  ///< of a match
-};
-
-/// Finds equal times along epipolar curves.
-class TimeFinder final : public MatchFinder {
+/// Matches the pixels of some rows from the top down, sixteen of a row at a time: the surface is expected to go on as
+/// in the row above, or else as on the left. What does not is looked at by itself.
+class RowFollower {
  public:
-  TimeFinder(const TimeMap& from, const SearchedMap& to) : from_(from), to_(to) {}
+  RowFollower(const TimeMap& from, const SearchedMap& to, const PixelMatcher& matcher, const EpipolarGeometry& geometry,
+              Correspondences& matches)
+      : from_(from),
+        matcher_(matcher),
+        geometry_(geometry),
+        matches_(matches),
+        max_sigma_px_(static_cast<float>(to.max_sigma_px)),
+        finder_(from, to),
+        batch_(make_batch(to, geometry)),
+        depth_above_(static_cast<std::size_t>(from.width()), not_a_number),
+        slope_above_(depth_above_) {}
 
-  Match find(int x, int y, const EpipolarCurve& curve, double expected) override {
-    const Wanted wanted{{to_.field, &curve, from_.time(x, y)}, from_.sigma(x, y), from_.amplitude(x, y)};
-    if (curve.contains(expected))
-      if (const auto root = follow(wanted.difference, expected, 1 / curve.speed(expected)))
-        if (contrast(*root, wanted) < suspicious) return match_at(*root, wanted);
-    return search(wanted, expected);
-  }
-
-  void find_quickly(int x, int y, const EpipolarGeometry& geometry, std::span<const double> expected,
-                    std::span<Match> matches) override {
-    if (from_.width() < 2 || from_.height() < 2) return;
-    prepare(geometry.view(), geometry.origin(), geometry.range());
-    bool any = false;
-    batch_.expected.fill(not_a_number);
-    for (std::size_t i = 0; i < expected.size(); ++i) {
-      const int row = y + static_cast<int>(i);
-      if (std::isnan(expected[i]) || from_.status(x, row) != PixelStatus::ok) continue;
-      const Eigen::Vector3f direction = geometry.direction(x, row).cast<float>();
-      for (std::size_t axis = 0; axis < 3; ++axis) batch_.direction[axis][i] = direction[static_cast<int>(axis)];
-      batch_.time[i] = from_.time(x, row);
-      batch_.amplitude[i] = from_.amplitude(x, row);
-      batch_.expected[i] = static_cast<float>(expected[i]);
-      any = true;
+  void match_row(int y) {
+    depth_left_ = not_a_number;
+    for (int x = 0; x < from_.width(); x += most_curves) {
+      const Pixels pixels{x, y, static_cast<std::size_t>(std::min(most_curves, from_.width() - x))};
+      if (!begin(pixels)) continue;
+      load(pixels);
+      follow(pixels);
+      for (std::size_t i = 0; i < pixels.count; ++i)
+        if (pending_[i]) look_closely(pixels, i);
+      remember();
     }
-    if (!any) return;
-    follow_curves(batch_);
-    for (std::size_t i = 0; i < expected.size(); ++i)
-      if (std::isfinite(batch_.inverse_depth[i])) matches[i] = judge(i, from_.sigma(x, y + static_cast<int>(i)));
   }
 
  private:
-  /// What is the same for all pixels.
-  void prepare(const View& view, const Eigen::Vector3d& origin, InverseDepthRange range) {
-    batch_.times = to_.field->arrays();
-    batch_.lens = view.lens();
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      batch_.origin[axis] = static_cast<float>(origin[static_cast<int>(axis)]);
-    batch_.far = static_cast<float>(range.far);
-    batch_.near = static_cast<float>(range.near);
-    batch_.brightness = static_cast<float>(to_.brightness);
-    batch_.most_contrast = static_cast<float>(suspicious);
-  }
-
-  Match judge(std::size_t i, float sigma) const {
-    const double variance = static_cast<double>(sigma) * sigma + batch_.variance[i], slope = batch_.slope[i];
-    const double sigma_px = std::sqrt(variance) / std::abs(slope);
-    if (!(sigma_px <= to_.max_sigma_px)) return Match::none(PixelStatus::ambiguous);
-    return {PixelStatus::ok, {batch_.u[i], batch_.v[i]}, sigma_px, batch_.inverse_depth[i], slope};
-  }
-
-  /// A spot of paper is about as bright in both cameras. Light that strays into a dark pixel beside bright paper has
-  /// times as well, but not the paper's amplitude: a match of this contrast is looked at twice, of that one refused.
-  static constexpr double suspicious = 4, impossible = 8;
-
-  struct Wanted {
-    TimeDifference difference;
-    float sigma, amplitude;
+  /// Neighbours in a row.
+  struct Pixels {
+    int x, y;
+    std::size_t count;
+    int column(std::size_t i) const { return x + static_cast<int>(i); }
   };
 
-  /// Ratio of the amplitudes of a pixel and of its match, whichever is larger.
-  double contrast(double root, const Wanted& wanted) const {
-    const auto pixel = wanted.difference.curve->at(root);
-    const double ratio = pixel ? to_.field->amplitude_at(*pixel) / (to_.brightness * wanted.amplitude) : 1;
-    return ratio > 0 ? std::max(ratio, 1 / ratio) : 1;
+  /// Which of the pixels can be matched. \return whether any can
+  bool begin(const Pixels& pixels) {
+    bool any = false;
+    pending_.fill(false);
+    depth_.fill(not_a_number);
+    for (std::size_t i = 0; i < pixels.count; ++i) {
+      const int x = pixels.column(i);
+      if (!matcher_.is_wanted(x, pixels.y)) continue;
+      const PixelStatus status = from_.status(x, pixels.y);
+      pending_[i] = status == PixelStatus::ok;
+      any = any || pending_[i];
+      if (!pending_[i]) put(Match::none(status), x, pixels.y, matches_);
+    }
+    return any;
   }
 
-  /// Looks along the whole curve.
-  Match search(const Wanted& wanted, double expected);
-  Match match_at(double root, const Wanted& wanted) const;
-  /// \return whether the other camera sees anything of the curve
-  bool find_roots(const Wanted& wanted);
+  void load(const Pixels& pixels) {
+    const float *time = &from_.time(pixels.x, pixels.y), *sigma = &from_.sigma(pixels.x, pixels.y);
+    const float* amplitude = &from_.amplitude(pixels.x, pixels.y);
+    const Eigen::Vector2d* rays = &geometry_.ray(pixels.x, pixels.y);
+    for (std::size_t i = 0; i < pixels.count; ++i) {
+      batch_.ray_x[i] = static_cast<float>(rays[i].x());
+      batch_.ray_y[i] = static_cast<float>(rays[i].y());
+      batch_.time[i] = time[i];
+      batch_.sigma[i] = sigma[i];
+      batch_.amplitude[i] = amplitude[i];
+    }
+  }
+
+  /// Finds what is clear at first sight.
+  void follow(const Pixels& pixels) {
+    const float *above = depth_above(pixels), *slope = slope_above(pixels);
+    for (std::size_t i = 0; i < pixels.count; ++i) {
+      const float expected = std::isnan(above[i]) ? depth_left_ : above[i];
+      batch_.expected[i] = pending_[i] ? expected : not_a_number;
+      batch_.expected_slope[i] = slope[i];
+    }
+    take(pixels);
+  }
+
+  /// Once a depth is known again, the others may go on from there.
+  void follow_from(float depth, const Pixels& pixels) {
+    for (std::size_t i = 0; i < pixels.count; ++i) {
+      batch_.expected[i] = pending_[i] ? depth : not_a_number;
+      batch_.expected_slope[i] = not_a_number;
+    }
+    take(pixels);
+  }
+
+  void take(const Pixels& pixels) {
+    std::fill(batch_.expected.begin() + static_cast<std::ptrdiff_t>(pixels.count), batch_.expected.end(), not_a_number);
+    follow_curves(batch_);
+    float *u = &matches_.u(pixels.x, pixels.y), *v = &matches_.v(pixels.x, pixels.y);
+    float *sigma = &matches_.sigma(pixels.x, pixels.y), *slope = &matches_.slope(pixels.x, pixels.y);
+    PixelStatus* status = &matches_.status(pixels.x, pixels.y);
+    float *above = depth_above(pixels), *above_slope = slope_above(pixels);
+    for (std::size_t i = 0; i < pixels.count; ++i) {
+      if (std::isnan(batch_.inverse_depth[i])) continue;
+      pending_[i] = false;
+      const bool good = batch_.sigma_px[i] <= max_sigma_px_;
+      status[i] = good ? PixelStatus::ok : PixelStatus::ambiguous;
+      u[i] = good ? batch_.u[i] : not_a_number;
+      if (!good) continue;
+      v[i] = batch_.v[i];
+      sigma[i] = batch_.sigma_px[i];
+      slope[i] = above_slope[i] = batch_.slope[i];
+      depth_[i] = above[i] = batch_.inverse_depth[i];
+    }
+  }
+
+  void look_closely(const Pixels& pixels, std::size_t i) {
+    const int x = pixels.column(i);
+    float &above = depth_above(pixels)[i], expected = depth_left_;
+    for (std::size_t k = 0; k < i; ++k) expected = std::isnan(depth_[k]) ? expected : depth_[k];
+    const Match match =
+        find_match(geometry_, finder_, x, pixels.y, static_cast<double>(std::isnan(expected) ? above : expected));
+    put(match, x, pixels.y, matches_);
+    pending_[i] = false;
+    if (match.status != PixelStatus::ok) return;
+    depth_[i] = above = static_cast<float>(match.inverse_depth);
+    slope_above(pixels)[i] = static_cast<float>(match.slope);
+    if (i + 1 < pixels.count && pending_[i + 1]) follow_from(depth_[i], pixels);
+  }
+
+  void remember() {
+    for (const float depth : depth_) depth_left_ = std::isnan(depth) ? depth_left_ : depth;
+  }
+
+  float* depth_above(const Pixels& pixels) { return &depth_above_[static_cast<std::size_t>(pixels.x)]; }
+  float* slope_above(const Pixels& pixels) { return &slope_above_[static_cast<std::size_t>(pixels.x)]; }
 
   const TimeMap& from_;
-  SearchedMap to_;
-  std::vector<std::size_t> changes_;  ///< along a curve, see search_curve()
-  std::vector<double> roots_;
-  CurveBatch batch_{};
+  const PixelMatcher& matcher_;
+  const EpipolarGeometry& geometry_;
+  Correspondences& matches_;
+  const float max_sigma_px_;
+  TimeFinder finder_;
+  CurveBatch batch_;
+  std::array<bool, most_curves> pending_{};  ///< pixels that have not been matched yet
+  CurveBatch::Each<float> depth_{};          ///< [1/mm] of these pixels, NaN where not found
+  float depth_left_ = not_a_number;          ///< [1/mm] of the last match to the left
+  std::vector<float> depth_above_;           ///< [1/mm] of the last match above
+  std::vector<float> slope_above_;           ///< [frames/px] of that
 };
 
 class TimeMatcher final : public PixelMatcher {
@@ -190,81 +175,16 @@ class TimeMatcher final : public PixelMatcher {
 
   PixelStatus status_of(int x, int y) const override { return from_.status(x, y); }
   std::unique_ptr<MatchFinder> make_finder() const override { return std::make_unique<TimeFinder>(from_, to_); }
+  void match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const override {
+    RowFollower follower(from_, to_, *this, geometry, matches);
+    for (int y = top; y < bottom; ++y)
+      if (wants_any_of(y)) follower.match_row(y);
+  }
 
  private:
   const TimeMap& from_;
   SearchedMap to_;
 };
-
-/// Which of several roots belongs to the pixel: the one that continues the left neighbour's surface, if the others are
-/// far from it; nothing if that cannot be told.
-std::optional<double> choose(const std::vector<double>& roots, double expected, double step) {
-  if (roots.size() == 1) return roots[0];
-  double nearest = nan, nearest_px = std::numeric_limits<double>::infinity(), second_px = nearest_px;
-  for (const double root : roots) {
-    const double distance_px = std::abs(root - expected) / step;
-    if (distance_px < nearest_px) {
-      second_px = std::exchange(nearest_px, distance_px);
-      nearest = root;
-    } else if (distance_px < second_px) {
-      second_px = distance_px;
-    }
-  }
-  const bool clear = nearest_px < 4 && second_px > 3 * nearest_px + 4;
-  return clear ? std::optional(nearest) : std::nullopt;
-}
-
-bool TimeFinder::find_roots(const Wanted& wanted) {
-  const TimeDifference& difference = wanted.difference;
-  const EpipolarCurve& curve = *difference.curve;
-  const auto [far, near] = curve.range();
-  const double pixels = (near - far) * std::max(curve.speed(far), curve.speed(near));
-  constexpr double longest_curve = 200000;  // beside the epipole a curve can be endless
-  const auto count = static_cast<std::size_t>(std::clamp(std::ceil(pixels), 1.0, longest_curve));
-  const double step = (near - far) / static_cast<double>(count);
-  prepare(curve.view(), curve.origin(), curve.range());
-  const Eigen::Vector3f direction = curve.direction().cast<float>();
-  const bool seen =
-      search_curve(batch_, {direction.x(), direction.y(), direction.z()}, static_cast<float>(difference.time),
-                   static_cast<float>(far), static_cast<float>(step), count, changes_);
-  roots_.clear();
-  for (const std::size_t k : changes_) {
-    const double low = far + static_cast<double>(k) * step, high = std::min(low + step, near);
-    const double at_low = difference(low), at_high = difference(high);
-    if (!(at_low * at_high <= 0)) continue;
-    const auto root = solve(difference, {low, high, at_low, at_high}, step);
-    const bool known = root && !roots_.empty() && *root - roots_.back() < step;
-    if (root && !known) roots_.push_back(*root);
-  }
-  return seen;
-}
-
-Match TimeFinder::search(const Wanted& wanted, double expected) {
-  if (!find_roots(wanted)) return Match::none(PixelStatus::outside_view);
-  std::erase_if(roots_, [&](double root) { return contrast(root, wanted) > impossible; });
-  const auto is_alike = [&](double root) { return contrast(root, wanted) < suspicious; };
-  if (std::ranges::any_of(roots_, is_alike)) std::erase_if(roots_, std::not_fn(is_alike));
-  if (roots_.empty()) return Match::none(PixelStatus::no_match);
-  const auto root = choose(roots_, expected, 1 / wanted.difference.curve->speed(roots_[0]));
-  return root ? match_at(*root, wanted) : Match::none(PixelStatus::ambiguous);
-}
-
-Match TimeFinder::match_at(double root, const Wanted& wanted) const {
-  const TimeDifference& difference = wanted.difference;
-  const EpipolarCurve& curve = *difference.curve;
-  const auto pixel = curve.at(root);
-  if (!pixel) return Match::none(PixelStatus::outside_view);
-  // The slope is taken over two pixels where the map allows it: over less, noise would be taken for slope.
-  const double step = 1 / curve.speed(root);
-  const double here = difference(root), before = difference(root - step), behind = difference(root + step);
-  double slope = 0.5 * (behind - before);
-  if (std::isnan(slope)) slope = std::isnan(behind) ? here - before : behind - here;
-  if (!std::isfinite(slope)) return Match::none(PixelStatus::no_match);
-  const double variance = static_cast<double>(wanted.sigma) * wanted.sigma + to_.field->variance_at(*pixel);
-  const double sigma_px = std::sqrt(variance) / std::abs(slope);
-  if (!(sigma_px <= to_.max_sigma_px)) return Match::none(PixelStatus::ambiguous);
-  return {PixelStatus::ok, *pixel, sigma_px, root, slope};
-}
 
 void require_size(const TimeMap& map, const RayTable& camera) {
   if (map.width() != camera.width() || map.height() != camera.height())

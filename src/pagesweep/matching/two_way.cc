@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -16,15 +15,6 @@ namespace pagesweep {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-Match find(const PixelMatcher& matcher, const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y,
-           double expected) {
-  const PixelStatus status = matcher.status_of(x, y);
-  if (status != PixelStatus::ok) return Match::none(status);
-  const EpipolarCurve curve = geometry.curve(x, y);
-  if (curve.range().empty()) return Match::none(PixelStatus::outside_view);
-  return finder.find(x, y, curve, expected);
-}
 
 /// What the options allow: from a tenth of the cameras' distance to infinity where they say nothing.
 InverseDepthRange allowed_range(const Camera& first, const Camera& second, const MatchOptions& options) {
@@ -52,87 +42,68 @@ constexpr int rows_at_once = 16;
 
 }  // namespace
 
-/// One camera's pixels and the other camera's picture.
+/// One camera's pixels and their curves in the other camera.
 struct TwoWayMatching::Direction {
-  const RayTable* from;
-  const RayTable* to;
-  const PixelMatcher* matcher;
-  EpipolarGeometry everywhere{*from, *to, {0, 0}};
+  const PixelMatcher& matcher;
+  const EpipolarGeometry& everywhere;
 
   EpipolarGeometry geometry(InverseDepthRange range) const { return everywhere.within(range); }
-  void probe(const Direction& back, InverseDepthRange range, InverseDepthRange range_back, int probes,
-             std::vector<double>& depths) const;
 };
 
 void put(const Match& match, int x, int y, Correspondences& matches) {
   matches.status(x, y) = match.status;
-  if (match.status != PixelStatus::ok) return;
+  if (match.status != PixelStatus::ok) {
+    matches.u(x, y) = not_a_number;
+    return;
+  }
   matches.u(x, y) = static_cast<float>(match.pixel.x());
   matches.v(x, y) = static_cast<float>(match.pixel.y());
   matches.sigma(x, y) = static_cast<float>(match.sigma_px);
   matches.slope(x, y) = static_cast<float>(match.slope);
 }
 
-void PixelMatcher::match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const {
-  const auto finder = make_finder();
-  const auto rows = static_cast<std::size_t>(bottom - top);
-  std::array<double, rows_at_once> expected;
-  std::array<Match, rows_at_once> column;
-  expected.fill(nan);
-  for (int x = 0; x < matches.width(); ++x) {
-    column.fill(Match::none(PixelStatus::not_computed));
-    std::array<double, rows_at_once> asked;
-    bool any = false;
-    for (std::size_t row = 0; row < rows; ++row) {
-      const bool wanted = is_wanted(x, top + static_cast<int>(row));
-      asked[row] = wanted ? expected[row] : nan;
-      any = any || wanted;
-    }
-    if (!any) continue;
-    finder->find_quickly(x, top, geometry, std::span(asked).first(rows), std::span(column).first(rows));
-    for (std::size_t row = 0; row < rows; ++row) {
-      const int y = top + static_cast<int>(row);
-      if (!is_wanted(x, y)) continue;
-      Match& match = column[row];
-      if (match.status == PixelStatus::not_computed) match = find(*this, geometry, *finder, x, y, expected[row]);
-      put(match, x, y, matches);
-      if (match.status == PixelStatus::ok) expected[row] = match.inverse_depth;
-    }
-  }
+Match find_match(const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y, double expected) {
+  const EpipolarCurve curve = geometry.curve(x, y);
+  if (curve.range().empty()) return Match::none(PixelStatus::outside_view);
+  return finder.find(x, y, curve, expected);
 }
 
-/// Inverse depths of the wanted ones of a grid of pixels, kept if the matched pixel's own match leads back. They join
-/// those that are known.
-void TwoWayMatching::Direction::probe(const Direction& back, InverseDepthRange range, InverseDepthRange range_back,
-                                      int probes, std::vector<double>& depths) const {
-  const EpipolarGeometry there_geometry = geometry(range), return_geometry = back.geometry(range_back);
-  const int width = from->width(), height = from->height();
+/// Inverse depths of the wanted ones of a grid of the first camera's pixels, and of those that they match, if these
+/// lead back. They join those that are known.
+void TwoWayMatching::probe(const Direction& there, const Direction& back, const DepthRanges& ranges, int probes,
+                           Probes& found) const {
+  const EpipolarGeometry there_geometry = there.geometry(ranges.there), return_geometry = back.geometry(ranges.back);
+  const int width = first_.width(), height = first_.height();
   const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / probes)));
-  std::vector<std::vector<double>> rows(static_cast<std::size_t>((height + stride - 1) / stride));
+  std::vector<Probes> rows(static_cast<std::size_t>((height + stride - 1) / stride));
   parallel_rows(static_cast<int>(rows.size()), [&](int row) {
-    const auto finder = matcher->make_finder(), return_finder = back.matcher->make_finder();
+    const auto finder = there.matcher.make_finder(), return_finder = back.matcher.make_finder();
     for (int x = stride / 2; x < width; x += stride) {
       const int y = std::min(row * stride + stride / 2, height - 1);
-      if (!matcher->is_wanted(x, y)) continue;
-      const Match match = find(*matcher, there_geometry, *finder, x, y, nan);
+      if (!there.matcher.is_wanted(x, y) || there.matcher.status_of(x, y) != PixelStatus::ok) continue;
+      const Match match = find_match(there_geometry, *finder, x, y, nan);
       if (match.status != PixelStatus::ok) continue;
-      const int u = std::clamp(static_cast<int>(std::lround(match.pixel.x())), 0, to->width() - 1);
-      const int v = std::clamp(static_cast<int>(std::lround(match.pixel.y())), 0, to->height() - 1);
-      const Match returned = find(*back.matcher, return_geometry, *return_finder, u, v, nan);
+      const int u = std::clamp(static_cast<int>(std::lround(match.pixel.x())), 0, second_.width() - 1);
+      const int v = std::clamp(static_cast<int>(std::lround(match.pixel.y())), 0, second_.height() - 1);
+      if (back.matcher.status_of(u, v) != PixelStatus::ok) continue;
+      const Match returned = find_match(return_geometry, *return_finder, u, v, nan);
       const bool agrees = returned.status == PixelStatus::ok && (returned.pixel - Eigen::Vector2d(x, y)).norm() < 3;
-      if (agrees) rows[static_cast<std::size_t>(row)].push_back(match.inverse_depth);
+      if (!agrees) continue;
+      rows[static_cast<std::size_t>(row)].there.push_back(match.inverse_depth);
+      rows[static_cast<std::size_t>(row)].back.push_back(returned.inverse_depth);
     }
   });
-  for (const auto& row : rows) depths.insert(depths.end(), row.begin(), row.end());
+  for (const Probes& row : rows) {
+    found.there.insert(found.there.end(), row.there.begin(), row.there.end());
+    found.back.insert(found.back.end(), row.back.begin(), row.back.end());
+  }
 }
 
 /// Few pixels look along their whole curves; many look where those found something, and far around it.
 TwoWayMatching::DepthRanges TwoWayMatching::find_ranges(const Direction& there, const Direction& back) {
   DepthRanges ranges{allowed_, allowed_};
   const auto look = [&](Probes& found, int probes, double more) {
-    const DepthRanges before = ranges;
-    there.probe(back, before.there, before.back, probes, found.there);
-    back.probe(there, before.back, before.there, probes, found.back);
+    probe(there, back, ranges, probes, found);
     ranges = {narrow(allowed_, found.there, more), narrow(allowed_, found.back, more)};
   };
   look(few_, 1000, 1.0);
@@ -144,13 +115,13 @@ void TwoWayMatching::match_one_way(const Direction& direction, InverseDepthRange
                                    Correspondences& matches) {
   constexpr int band = 8 * rows_at_once;  // rows between two reports of progress
   const EpipolarGeometry geometry = direction.geometry(range);
-  progress.begin(fmt::format("matching {} with {}", direction.from->camera().name, direction.to->camera().name));
+  progress.begin(fmt::format("matching {} with {}", geometry.from().camera().name, geometry.to().camera().name));
   for (int top = 0; top < matches.height(); top += band) {
     const int rows = std::min(band, matches.height() - top);
     parallel_ranges(rows, rows_at_once, [&](int begin, int end) {
       bool any = false;
-      for (int y = top + begin; y < top + end; ++y) any = any || direction.matcher->wants_any_of(y);
-      if (any) direction.matcher->match_rows(geometry, top + begin, top + end, matches);
+      for (int y = top + begin; y < top + end; ++y) any = any || direction.matcher.wants_any_of(y);
+      if (any) direction.matcher.match_rows(geometry, top + begin, top + end, matches);
     });
     progress.advance(static_cast<double>(top + rows) / matches.height());
   }
@@ -161,7 +132,9 @@ TwoWayMatching::TwoWayMatching(const RayTable& first, const RayTable& second, co
       second_(second),
       max_disagreement_px_(options.max_disagreement_px),
       allowed_(allowed_range(first.camera(), second.camera(), options)),
-      range_is_known_(options.near_mm > 0 && options.far_mm > 0) {
+      range_is_known_(options.near_mm > 0 && options.far_mm > 0),
+      there_(first, second, {}),
+      back_(second, first, {}) {
   const RayTable* cameras[] = {&first, &second};
   Correspondences* matches[] = {&pair_.from_first, &pair_.from_second};
   Image<PixelStatus>* found[] = {&found_.first, &found_.second};
@@ -173,16 +146,16 @@ TwoWayMatching::TwoWayMatching(const RayTable& first, const RayTable& second, co
 }
 
 void TwoWayMatching::match(const PixelMatcher& from_first, const PixelMatcher& from_second, Progress& progress) {
-  const Direction there{&first_, &second_, &from_first}, back{&second_, &first_, &from_second};
+  const Direction there{from_first, there_}, back{from_second, back_};
   progress.begin("looking for the range of depths");
   const DepthRanges ranges = range_is_known_ ? DepthRanges{allowed_, allowed_} : find_ranges(there, back);
   const auto match = [&](const Direction& direction, InverseDepthRange range, Correspondences& matches,
                          Image<PixelStatus>& found) {
     match_one_way(direction, range, progress, matches);
     parallel_rows(matches.height(), [&](int y) {
-      if (!direction.matcher->wants_any_of(y)) return;
+      if (!direction.matcher.wants_any_of(y)) return;
       for (int x = 0; x < matches.width(); ++x)
-        if (direction.matcher->is_wanted(x, y)) found(x, y) = matches.status(x, y);
+        if (direction.matcher.is_wanted(x, y)) found(x, y) = matches.status(x, y);
     });
   };
   match(there, ranges.there, pair_.from_first, found_.first);

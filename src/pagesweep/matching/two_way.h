@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <limits>
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "pagesweep/matching/agreement.h"
@@ -28,16 +27,12 @@ struct Match {
   }
 };
 
-/// Finds matches from left to right. It holds scratch memory: one a thread.
+/// Finds the matches of single pixels. It holds scratch memory: one a thread.
 class MatchFinder {
  public:
   virtual ~MatchFinder() = default;
-  /// \param expected  inverse depth of the last match to the left; NaN if there is none
+  /// \param expected  inverse depth of a neighbour's match; NaN if there is none
   virtual Match find(int x, int y, const EpipolarCurve& curve, double expected) = 0;
-  /// Quick matches of the pixels (x, y), (x, y + 1), ..., as many as there are `expected` depths: what is clear at
-  /// first sight. Others keep the status not_computed and are left to find().
-  virtual void find_quickly(int /*x*/, int /*y*/, const EpipolarGeometry& /*geometry*/,
-                            std::span<const double> /*expected*/, std::span<Match> /*matches*/) {}
 };
 
 /// One camera's pixels as they can be matched with the other's: what the two matchers differ in.
@@ -51,12 +46,15 @@ class PixelMatcher {
   /// Why the pixel cannot be matched at all; ok if it can.
   virtual PixelStatus status_of(int x, int y) const = 0;
   virtual std::unique_ptr<MatchFinder> make_finder() const = 0;
-  /// Matches the rows top ... bottom - 1: some side by side, each from left to right.
-  virtual void match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const;
+  /// Matches the rows top ... bottom - 1. What it remembers from row to row it forgets before the first one.
+  virtual void match_rows(const EpipolarGeometry& geometry, int top, int bottom, Correspondences& matches) const = 0;
 
  private:
   const PixelSet* only_;
 };
+
+/// Looks for one pixel's match on its curve, see MatchFinder::find().
+Match find_match(const EpipolarGeometry& geometry, MatchFinder& finder, int x, int y, double expected);
 
 /// Enters one pixel's match, or why it has none.
 void put(const Match& match, int x, int y, Correspondences& matches);
@@ -89,6 +87,7 @@ class TwoWayMatching {
     std::vector<double> there, back;
   };
   struct Direction;
+  void probe(const Direction& there, const Direction& back, const DepthRanges& ranges, int probes, Probes& found) const;
   DepthRanges find_ranges(const Direction& there, const Direction& back);
   void match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress, Correspondences& matches);
 
@@ -97,6 +96,7 @@ class TwoWayMatching {
   double max_disagreement_px_;
   InverseDepthRange allowed_;
   bool range_is_known_;
+  EpipolarGeometry there_, back_;  ///< of no range
   Probes few_, many_;
   MatchPair pair_;
   FoundStatus found_;
