@@ -221,7 +221,8 @@ class CurveSearch {
 
   /// Looks closely where the time may be that is looked for, and else nowhere.
   bool operator()(std::vector<std::size_t>& changes) const {
-    const std::size_t stretches = (line_.count + stretch - 1) / stretch, at_once = hn::Lanes(Floats()) - 1;
+    const std::size_t stretches = (line_.count + stretch - 1) / stretch, lanes = hn::Lanes(Floats());
+    const std::size_t at_once = std::max<std::size_t>(1, lanes - 1);
     bool seen = false;
     for (std::size_t i = 0; i < stretches; i += at_once) {
       const Promise promise = look_over(i);

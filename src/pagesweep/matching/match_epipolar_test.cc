@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <random>
 
+#include "pagesweep/base/instruction_sets_testing.h"
 #include "pagesweep/base/parallel.h"
 #include "pagesweep/sim/analytic_scene.h"
 
@@ -220,6 +222,23 @@ TEST_F(MatchTimesOfAFlatPage, DoesNotDependOnTheNumberOfThreads) {
     if (many.from_first.status.data()[i] != PixelStatus::ok) continue;
     ASSERT_EQ(many.from_first.u.data()[i], single.from_first.u.data()[i]);
     ASSERT_EQ(many.from_first.sigma.data()[i], single.from_first.sigma.data()[i]);
+  }
+}
+
+/// Neighbours lie side by side in the other picture, in reverse, or one below the other.
+TEST_F(MatchTimesOfAFlatPage, FindsThemHoweverACameraIsTurnedWithEveryInstructionSet) {
+  for (const double quarters : {0, 1, 2}) {
+    Camera turned = cam2;
+    const Eigen::AngleAxisd turn(quarters * M_PI / 2, Eigen::Vector3d::UnitZ());
+    turned.cam_from_rig = Rigid3(turn.toRotationMatrix(), Eigen::Vector3d::Zero()) * cam2.cam_from_rig;
+    const TimeMap times = flat.times(turned, *rig.light);
+    const Correspondences truth = flat.correspondences(cam1, turned);
+    on_every_instruction_set([&] {
+      const Errors e = compare(match_times(times1, times, cam1, turned).from_first, truth, 0.5);
+      EXPECT_EQ(e.wrong, 0) << quarters;
+      EXPECT_GT(e.matched, 0.98 * e.should_match) << quarters;
+      EXPECT_LT(e.rms_px, 0.01) << quarters;
+    });
   }
 }
 

@@ -3,11 +3,12 @@
 
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
 #include <Eigen/Core>
 #include <cmath>
 #include <limits>
 #include <random>
+
+#include "pagesweep/base/instruction_sets_testing.h"
 
 namespace pagesweep {
 namespace {
@@ -70,7 +71,6 @@ class NearestPlace : public testing::TestWithParam<Normalisation> {
     batch.samples = frames;
     batch.freedom = frames - 3;
   }
-  ~NearestPlace() override { hwy::SetSupportedTargetsForTest(0); }
 
   Sequence seen_from(double place) const { return (affine ? 1.3 : 1.0) * pattern(place); }
   Sequence noisy(double place, unsigned seed) const {
@@ -82,20 +82,18 @@ class NearestPlace : public testing::TestWithParam<Normalisation> {
   }
   /// Of lane k, on all instruction sets.
   template <class Body>
-  void on_every_target(Interpolation interpolation, const Body& body) {
-    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      SCOPED_TRACE(hwy::TargetName(target));
-      hwy::SetSupportedTargetsForTest(target);
+  void on_each(Interpolation interpolation, const Body& body) {
+    on_every_instruction_set([&] {
       find_nearest_places(batch, GetParam(), interpolation);
       for (std::size_t k = 0; k < batch.count; ++k) body(k);
-    }
+    });
   }
 };
 
 TEST_P(NearestPlace, IsTheBestOfAllOnTheLine) {
   std::array<Sequence, PlaceBatch::most> g;
   for (unsigned k = 0; k < g.size(); ++k) load(g[k] = noisy(1 + k / 15.0, k), s, 0, k, batch);
-  on_every_target(Interpolation::linear, [&](std::size_t k) {
+  on_each(Interpolation::linear, [&](std::size_t k) {
     const auto at = [&](double share) {
       return distance_squared(g[k], combine(s, linear_weights(share).value), affine);
     };
@@ -111,7 +109,7 @@ TEST_P(NearestPlace, IsTheBestOfAllOnTheLine) {
 TEST_P(NearestPlace, IsTheBestOfAllOnTheSpline) {
   std::array<Sequence, PlaceBatch::most> g;
   for (unsigned k = 0; k < g.size(); ++k) load(g[k] = noisy(1 + k / 15.0, k), s, 0, k, batch);
-  on_every_target(Interpolation::cubic, [&](std::size_t k) {
+  on_each(Interpolation::cubic, [&](std::size_t k) {
     const auto at = [&](double share) {
       return distance_squared(g[k], combine(s, cubic_weights(share).value), affine);
     };
@@ -127,9 +125,9 @@ TEST_P(NearestPlace, FindsThePlaceOfASmoothPattern) {
   for (unsigned k = 0; k < PlaceBatch::most; ++k) load(seen_from(1 + k / 15.0), s, 0, k, batch);
   double squares = 0;
   const auto add_error = [&](std::size_t k) { squares += std::pow(1 + batch.share[k] - (1 + k / 15.0), 2); };
-  on_every_target(Interpolation::linear, add_error);
+  on_each(Interpolation::linear, add_error);
   const double linear_squares = std::exchange(squares, 0);
-  on_every_target(Interpolation::cubic, add_error);
+  on_each(Interpolation::cubic, add_error);
   const auto targets = static_cast<double>(hwy::SupportedAndGeneratedTargets().size());
   EXPECT_LT(std::sqrt(squares / targets / PlaceBatch::most), 0.005);  // waves 12 and 20 crossings long
   // A free gain makes up for most of what linear interpolation attenuates.
@@ -161,7 +159,7 @@ TEST_P(NearestPlace, NoiseOfTheCrossingsDoesNotDrawItToTheMiddle) {
 TEST_P(NearestPlace, KnowsNothingBesideAMissingCrossing) {
   for (unsigned k = 0; k < PlaceBatch::most; ++k) load(noisy(1.4, k), s, 0, k, batch);
   batch.usable[1][2] = batch.usable[2][3] = batch.usable[0][4] = batch.usable[3][5] = 0;
-  on_every_target(Interpolation::cubic, [&](std::size_t k) {
+  on_each(Interpolation::cubic, [&](std::size_t k) {
     EXPECT_EQ(std::isnan(batch.share[k]), k == 2 || k == 3) << k;
     EXPECT_EQ(batch.is_cubic[k] > 0, k < 2 || k > 5) << k;
     EXPECT_EQ(batch.doubt[k] > 0, k < 2 || k > 5) << k;

@@ -86,7 +86,8 @@ class SideBySide {
     hn::Mask<Integers> rest = hn::RebindMask(d, place.inside);
     while (count_ < most && last >= 0 && !hn::AllFalse(d, rest)) {
       Stretch& stretch = stretches_[count_++];
-      stretch.begin = std::clamp(cells[hn::FindKnownFirstTrue(d, rest)] - margin, 0, last);
+      // A little before the first one, for others that are not in order.
+      stretch.begin = std::clamp(cells[hn::FindKnownFirstTrue(d, rest)] - lanes / 4, 0, last);
       stretch.offset = hn::Sub(place.cell, hn::Set(d, stretch.begin));
       const auto here = hn::And(
           rest, hn::And(hn::Gt(stretch.offset, hn::Set(d, -1)), hn::Lt(stretch.offset, hn::Set(d, 2 * lanes - 1))));
@@ -117,7 +118,6 @@ class SideBySide {
 
  private:
   static constexpr int most = 4;
-  static constexpr int margin = 4;  ///< pixels before the first cell, for others that are not in order
 
   struct Stretch {
     int begin;                 ///< pixel
