@@ -45,6 +45,7 @@ struct Seeker {
   int place_of_best = 0;
   Eigen::Vector2d rival_px{0, 0};  ///< if that makes it ambiguous
   bool has_rival = false;
+  bool returns = false;  ///< its fit is where a match of the other camera began
   std::optional<Match> verdict;
 
   std::span<const std::int32_t> scores_between(int first, int last) const {
@@ -104,8 +105,9 @@ class SequenceFinder final : public MatchFinder {
   void find_all(std::size_t count);
   void lay(std::span<Seeker> seekers);
   void begin(Seeker& seeker);
-  void return_home(std::span<Seeker> seekers);
-  bool is_home(const SequenceFit& fit, Seeker& seeker) const;
+  bool begin_to_return(Seeker& seeker);
+  void end_return(const SequenceFit& fit, Seeker& seeker);
+  bool is_home(const SequenceFit& fit, const Seeker& seeker) const;
   void seek(Seeker& seeker);
   std::optional<float> next_place(Seeker& seeker) const;
   std::optional<float> only_promising_place(Seeker& seeker) const;
@@ -138,10 +140,8 @@ class SequenceFinder final : public MatchFinder {
 void SequenceFinder::find_all(std::size_t count) {
   const auto seekers = std::span(seekers_).first(count);
   lay(seekers);
+  asked_.clear();
   for (Seeker& seeker : seekers) begin(seeker);
-  if (known_) return_home(seekers);
-  for (Seeker& seeker : seekers)
-    if (!seeker.verdict) seek(seeker);
   decide(seekers);
   judge_sigmas(seekers);
 }
@@ -163,8 +163,9 @@ void SequenceFinder::lay(std::span<Seeker> seekers) {
   }
 }
 
+/// Asks for a seeker's first fit, if it needs any.
 void SequenceFinder::begin(Seeker& seeker) {
-  seeker.has_best = seeker.has_rival = false;
+  seeker.has_best = seeker.has_rival = seeker.returns = false;
   seeker.verdict.reset();
   if (!(seeker.line.count > 0)) {
     seeker.verdict = Match::none(PixelStatus::outside_view);
@@ -172,34 +173,37 @@ void SequenceFinder::begin(Seeker& seeker) {
   }
   seeker.energy = from_.energy(seeker.index);
   seeker.own = from_.sequence(seeker.index);
+  if (begin_to_return(seeker)) return;
+  seek(seeker);
+  ask(seeker);
 }
 
-/// Where a pixel of the other camera found its match at a seeker, and no other one did: whether it is its match, too.
-void SequenceFinder::return_home(std::span<Seeker> seekers) {
-  asked_.clear();
-  for (Seeker& seeker : seekers) {
-    if (seeker.verdict || !(seeker.line.straight > 0)) continue;
-    if (const auto home = known_->origin(seeker.index)) {
-      const float share = (*home - seeker.line.from) / (seeker.line.to - seeker.line.from);
-      if (share >= 0 && share <= 1) ask_at(seeker.inverse_depth_at(share), seeker);
-    }
-  }
-  while (!asked_.empty()) {
-    const std::size_t moving = fitter_.fit(frame_, asked_);
-    heard_.assign(asked_.begin() + static_cast<std::ptrdiff_t>(moving), asked_.end());
-    asked_.resize(moving);
-    for (const SequenceFit* fit : heard_) {
-      Seeker& seeker = seekers[static_cast<std::size_t>(fit - fits_.data())];
-      if (!is_home(*fit, seeker)) continue;
-      seeker.best = *fit;
-      seeker.has_best = true;
-      judge(seeker);
-    }
+/// Where one pixel of the other camera found its match at a seeker, and no other one did, that place is fitted first.
+bool SequenceFinder::begin_to_return(Seeker& seeker) {
+  if (!known_ || !(seeker.line.straight > 0)) return false;
+  const auto origin = known_->origin(seeker.index);
+  if (!origin) return false;
+  const float share = (*origin - seeker.line.from) / (seeker.line.to - seeker.line.from);
+  if (!(share >= 0 && share <= 1)) return false;
+  seeker.returns = true;
+  ask_at(seeker.inverse_depth_at(share), seeker);
+  return true;
+}
+
+/// A fit where the match should be is the match, or else the whole curve has to be searched.
+void SequenceFinder::end_return(const SequenceFit& fit, Seeker& seeker) {
+  seeker.returns = false;
+  if (is_home(fit, seeker)) {
+    seeker.best = fit;
+    seeker.has_best = true;
+    judge(seeker);
+  } else {
+    seek(seeker);
   }
 }
 
-bool SequenceFinder::is_home(const SequenceFit& fit, Seeker& seeker) const {
-  constexpr int most_attempts = 3;
+bool SequenceFinder::is_home(const SequenceFit& fit, const Seeker& seeker) const {
+  constexpr int most_attempts = 3;  // so that it is no more than two pixels away
   return fit.found && fit.attempts <= most_attempts && fit.least_sigma_px <= options_.max_sigma_px &&
          fit.distance_squared <= options_.max_dissimilarity * seeker.energy;
 }
@@ -252,15 +256,16 @@ std::optional<float> SequenceFinder::next_place(Seeker& seeker) const {
 
 /// In rounds: fits each seeker's most promising place, until a verdict is found or no other place can change it.
 void SequenceFinder::decide(std::span<Seeker> seekers) {
-  asked_.clear();
-  for (Seeker& seeker : seekers) ask(seeker);
   while (!asked_.empty()) {
     const std::size_t moving = fitter_.fit(frame_, asked_);
     heard_.assign(asked_.begin() + static_cast<std::ptrdiff_t>(moving), asked_.end());
     asked_.resize(moving);
     for (const SequenceFit* fit : heard_) {
       Seeker& seeker = seekers[static_cast<std::size_t>(fit - fits_.data())];
-      if (fit->found) hear(*fit, seeker);
+      if (seeker.returns)
+        end_return(*fit, seeker);
+      else if (fit->found)
+        hear(*fit, seeker);
       ask(seeker);
     }
   }

@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 
 #include "pagesweep/base/parallel.h"
@@ -113,18 +115,19 @@ TwoWayMatching::DepthRanges TwoWayMatching::find_ranges(const Direction& there, 
 
 void TwoWayMatching::match_one_way(const Direction& direction, InverseDepthRange range, Progress& progress,
                                    Correspondences& matches) {
-  constexpr int band = 8 * rows_at_once;  // rows between two reports of progress
   const EpipolarGeometry geometry = direction.geometry(range);
   progress.begin(fmt::format("matching {} with {}", geometry.from().camera().name, geometry.to().camera().name));
-  for (int top = 0; top < matches.height(); top += band) {
-    const int rows = std::min(band, matches.height() - top);
-    parallel_ranges(rows, rows_at_once, [&](int begin, int end) {
-      bool any = false;
-      for (int y = top + begin; y < top + end; ++y) any = any || direction.matcher.wants_any_of(y);
-      if (any) direction.matcher.match_rows(geometry, top + begin, top + end, matches);
-    });
-    progress.advance(static_cast<double>(top + rows) / matches.height());
-  }
+  // Nobody waits until all others are as far: this thread tells for all of them.
+  const std::thread::id reporter = std::this_thread::get_id();
+  std::atomic<int> rows_done = 0;
+  parallel_ranges(matches.height(), rows_at_once, [&](int begin, int end) {
+    bool any = false;
+    for (int y = begin; y < end; ++y) any = any || direction.matcher.wants_any_of(y);
+    if (any) direction.matcher.match_rows(geometry, begin, end, matches);
+    const int rows = rows_done += end - begin;
+    if (std::this_thread::get_id() == reporter) progress.advance(static_cast<double>(rows) / matches.height());
+  });
+  progress.advance(1);
 }
 
 TwoWayMatching::TwoWayMatching(const RayTable& first, const RayTable& second, const MatchOptions& options)
