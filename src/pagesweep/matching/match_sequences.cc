@@ -22,7 +22,7 @@
 namespace pagesweep {
 namespace {
 
-constexpr std::size_t pixels_at_once = 2 * PlaceBatch::most;
+constexpr std::size_t pixels_at_once = 4 * PlaceBatch::most;
 
 /// A pixel that looks for its match.
 struct Seeker {
