@@ -237,6 +237,34 @@ TEST_F(MatchSequences, ARepeatedPatternIsAmbiguous) {
   EXPECT_EQ(matches.status(80, 80), PixelStatus::ambiguous);
 }
 
+/// The second way begins where the first one ended, which must not hide that there are two places to begin at.
+TEST_F(MatchSequences, WhatIsRepeatedOnceIsAmbiguousOnBothWays) {
+  const auto repeated = [](int i, double x, double y) { return random_waves(i, x, y > 15 && y < 35 ? y - 50 : y); };
+  MatchOptions options;
+  options.near_mm = 400;
+  options.far_mm = 1000;
+  const Frames frames1 = expose(cylinder, cam1, repeated, 16, {}, 1);
+  const Frames frames2 = expose(cylinder, cam2, repeated, 16, {}, 2);
+  const MatchPair pair = match_sequences(frames1, frames2, cam1, cam2, options);
+  const auto count = [&](const Correspondences& matches, const Camera& camera) {
+    const PointMap points = cylinder.points(camera);
+    std::array<int, 2> in_strips{}, matched{};
+    for (int y = 0; y < camera.height; ++y)
+      for (int x = 0; x < camera.width; ++x) {
+        const double from_middle = std::abs(std::abs(points.y(x, y)) - 25);  // of the two strips
+        if (!(from_middle < 6 || (from_middle > 14 && std::abs(points.y(x, y)) < 80))) continue;
+        const std::size_t k = from_middle < 6 ? 0 : 1;
+        ++in_strips[k];
+        matched[k] += matches.status(x, y) == PixelStatus::ok ? 1 : 0;
+      }
+    EXPECT_GT(in_strips[0], 1000);
+    EXPECT_LT(matched[0], 0.02 * in_strips[0]);  // noise may make one of two places the better one
+    EXPECT_GT(matched[1], 0.9 * in_strips[1]);
+  };
+  count(pair.from_first, cam1);
+  count(pair.from_second, cam2);
+}
+
 TEST_F(MatchSequences, CamerasMayBeTurned) {
   // By a quarter curves run along the rows, by an eighth neither along rows nor columns.
   for (const auto& [first, second] : {std::pair(M_PI / 2, 0.0), std::pair(0.0, M_PI / 4)}) {
