@@ -148,19 +148,9 @@ struct FineCells {
         if (within(i, j)) base(i, j) = model.height({field.p_of(u), field.q_of(v)});
       }
     });
-    std::vector<std::vector<PlanPoint>> members(gaps.size());
-    for (int j = 0; j < field.rows(); ++j)
-      for (int i = 0; i < field.columns(); ++i)
-        if (differences.gaps(i, j).weight > 0) sort_points(differences.gaps(i, j), i, j, field, members);
-    parallel_rows(rows, [&](int j) {
-      for (int i = 0; i < columns; ++i) {
-        const auto& points =
-            members[static_cast<std::size_t>(j) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(i)];
-        if (points.empty()) continue;
-        CellMean& cell = gaps(i, j) = mean_of(points, field.p_of(double(i) / finer), field.q_of(double(j) / finer));
-        cell.z -= static_cast<float>(model.height(
-            {field.p_of(double(i) / finer) + double(cell.p), field.q_of(double(j) / finer) + double(cell.q)}));
-      }
+    parallel_ranges(rows, 16, [&](int begin, int end) {
+      std::vector<std::vector<PlanPoint>> row(static_cast<std::size_t>(columns));
+      for (int j = begin; j < end; ++j) average_row(differences, model, j, row);
     });
   }
 
@@ -169,16 +159,32 @@ struct FineCells {
   Image<std::uint8_t> within;
 
  private:
+  /// \param row  has a place for the points of each cell
+  void average_row(const Differences& differences, const RuledSurface& model, int j,
+                   std::vector<std::vector<PlanPoint>>& row) {
+    const HeightField& field = *differences.field;
+    for (auto& points : row) points.clear();
+    for (int y = j / finer; y <= (j + 1) / finer; ++y)  // the large cells that reach into this row
+      for (int x = 0; x < field.columns(); ++x)
+        if (y < field.rows() && differences.gaps(x, y).weight > 0) sort_points(differences, x, y, j, row);
+    for (int i = 0; i < gaps.width(); ++i) {
+      const auto& points = row[static_cast<std::size_t>(i)];
+      if (points.empty()) continue;
+      const double p_mm = field.p_of(double(i) / finer), q_mm = field.q_of(double(j) / finer);
+      CellMean& cell = gaps(i, j) = mean_of(points, p_mm, q_mm);
+      cell.z -= static_cast<float>(model.height({p_mm + double(cell.p), q_mm + double(cell.q)}));
+    }
+  }
+
   /// A cell on the gutter holds points of the other page as well: there its own mean has to do.
-  void sort_points(const CellMean& cell, int i, int j, const HeightField& field,
-                   std::vector<std::vector<PlanPoint>>& members) const {
-    if (cell.count != field.cells(i, j).count) return;
-    for (const PlanPoint& point : field.surface_points(i, j)) {
-      const int a = static_cast<int>(std::lround(finer * field.i_of(point.p)));
-      const int b = static_cast<int>(std::lround(finer * field.j_of(point.q)));
-      if (gaps.contains(a, b))
-        members[static_cast<std::size_t>(b) * static_cast<std::size_t>(gaps.width()) + static_cast<std::size_t>(a)]
-            .push_back(point);
+  static void sort_points(const Differences& differences, int x, int y, int j,
+                          std::vector<std::vector<PlanPoint>>& row) {
+    const HeightField& field = *differences.field;
+    if (differences.gaps(x, y).count != field.cells(x, y).count) return;
+    for (const PlanPoint& point : field.surface_points(x, y)) {
+      const long i = std::lround(finer * field.i_of(point.p));
+      if (std::lround(finer * field.j_of(point.q)) == j && i >= 0 && i < static_cast<long>(row.size()))
+        row[static_cast<std::size_t>(i)].push_back(point);
     }
   }
 };

@@ -204,8 +204,8 @@ PageSurface finish_page(const FittedPage& fitted, const HeightField& field, cons
                           (options.model == SurfaceModel::automatic && strained_share(by_model) > share_that_matters);
   if (!may_follow) return sample(by_model, field, SurfaceModel::cylinder);
   const Differences creased = crease_differences(differences, fitted.model, options.neighbourhood_mm);
-  FlatPage flat(fitted.model, creased, fitted.places, fitted.gutter, options.straighten);
-  flat.follow_measurement();
+  FlatPage flat = by_model;
+  flat.follow_measurement(creased);
   // Points too coarse for the sheet's folds make it one that no paper could be: the model knows better.
   if (options.model == SurfaceModel::automatic && strained_share(flat) > strained_share(by_model))
     return sample(by_model, field, SurfaceModel::cylinder);

@@ -96,7 +96,7 @@ double CutLength::alpha_at(double length_mm) const {
 FlatPage::FlatPage(const RuledSurface& model, const Differences& differences, std::span<const Support> places,
                    GutterSide gutter, bool straighten)
     : model_(model),
-      differences_(differences),
+      differences_(&differences),
       gutter_(gutter),
       straighten_(straighten),
       cut_(model, alpha_range(model, places, gutter).low, alpha_range(model, places, gutter).high) {
@@ -127,7 +127,8 @@ void FlatPage::set_nodes(double spacing_mm) {
   b_step_ = (b1_ - b0_) / (rows_ - 1);
 }
 
-void FlatPage::follow_measurement() {
+void FlatPage::follow_measurement(const Differences& differences) {
+  differences_ = &differences;
   follows_ = true;
   const Image<Eigen::Vector2d> by_model = flat_;
   set_nodes(creased_node_spacing_mm);
@@ -141,7 +142,7 @@ void FlatPage::follow_measurement() {
 }
 
 Eigen::Vector3d FlatPage::above(double alpha, double b) const {
-  return measured_above(model_, differences_, model_.point(alpha, b), model_.normal(alpha, b));
+  return measured_above(model_, *differences_, model_.point(alpha, b), model_.normal(alpha, b));
 }
 
 Eigen::Vector3d FlatPage::surface_point(double alpha, double b) const {
@@ -321,7 +322,7 @@ PageSurface FlatPage::sample(const PlanFrame& frame) const {
   for_each_node(page, [&](int i, int j, const Eigen::Vector2d& node) {
     const double alpha = alpha_of(node.x()), b = b_of(node.y());
     const Eigen::Vector3d point = model_.point(alpha, b), normal = model_.normal(alpha, b);
-    const Eigen::Vector3d measured = measured_above(model_, differences_, point, normal);
+    const Eigen::Vector3d measured = measured_above(model_, *differences_, point, normal);
     look_up_status(measured, normal.z(), page.sigma(i, j), page.status(i, j));
     page.cover_mm(i, j) = cover_above(measured);
     const int column = std::clamp(static_cast<int>(std::lround(node.x())), 0, columns_ - 1);
@@ -356,17 +357,17 @@ bool FlatPage::is_measured(const Eigen::Vector3d& point) const {
 
 void FlatPage::look_up_status(const Eigen::Vector3d& measured, double normal_z, float& sigma,
                               PixelStatus& status) const {
-  const int i = static_cast<int>(std::lround(differences_.field->i_of(measured.x())));
-  const int j = static_cast<int>(std::lround(differences_.field->j_of(measured.y())));
-  if (!differences_.status.contains(i, j)) return;
-  status = differences_.status(i, j);
-  sigma = differences_.sigma(i, j) * static_cast<float>(normal_z);
+  const int i = static_cast<int>(std::lround(differences_->field->i_of(measured.x())));
+  const int j = static_cast<int>(std::lround(differences_->field->j_of(measured.y())));
+  if (!differences_->status.contains(i, j)) return;
+  status = differences_->status(i, j);
+  sigma = differences_->sigma(i, j) * static_cast<float>(normal_z);
 }
 
 float FlatPage::cover_above(const Eigen::Vector3d& measured) const {
-  const int i = static_cast<int>(std::lround(differences_.field->i_of(measured.x())));
-  const int j = static_cast<int>(std::lround(differences_.field->j_of(measured.y())));
-  return differences_.cover_mm.contains(i, j) ? differences_.cover_mm(i, j) : not_a_number;
+  const int i = static_cast<int>(std::lround(differences_->field->i_of(measured.x())));
+  const int j = static_cast<int>(std::lround(differences_->field->j_of(measured.y())));
+  return differences_->cover_mm.contains(i, j) ? differences_->cover_mm(i, j) : not_a_number;
 }
 
 /// Largest error of the interpolated model in the middle of cells, a sample of their rows, the gutter's among them.

@@ -48,7 +48,8 @@ class FlatPage {
   FlatPage(const RuledSurface& model, const Differences& differences, std::span<const Support> places,
            GutterSide gutter, bool straighten);
   /// Takes the measured surface itself for the model: it is laid flat anew, with the least stretching.
-  void follow_measurement();
+  /// \param differences  of that surface from the model; kept as a reference
+  void follow_measurement(const Differences& differences);
 
   /// The page on a regular grid of paper coordinates, fine enough that interpolation errs by less than 0.01 mm.
   PageSurface sample(const PlanFrame& frame) const;
@@ -79,7 +80,7 @@ class FlatPage {
   void look_up_status(const Eigen::Vector3d& measured, double normal_z, float& sigma, PixelStatus& status) const;
 
   const RuledSurface& model_;
-  const Differences& differences_;
+  const Differences* differences_;
   std::vector<Eigen::Vector2d> places_;
   GutterSide gutter_;
   bool straighten_;
