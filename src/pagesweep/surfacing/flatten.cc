@@ -5,7 +5,9 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace pagesweep {
@@ -13,6 +15,7 @@ namespace {
 
 constexpr int most_steps = 12;
 constexpr double settled_mm = 1e-5;
+constexpr double held_weight = 1e3;
 
 struct Edge {
   int from, to;  // node numbers
@@ -76,12 +79,8 @@ class Relaxation {
 
   void run() {
     double before = energy(edges_, places_);
-    bool factorised = false;
-    double last_move = 0;
     for (int step = 0; step < most_steps; ++step) {
-      // The matrix hardly changes near the solution: it is factorised anew only if steps do not shrink fast without.
-      if (!factorised) factorise();
-      Eigen::VectorXd move = cholesky_.solve(-gradient());
+      Eigen::VectorXd move = next_move(step > 0);
       Eigen::VectorXd trial = places_ + move;
       double after = energy(edges_, trial);
       for (int halving = 0; halving < 8 && !(after <= before); ++halving) {
@@ -92,10 +91,7 @@ class Relaxation {
       if (!(after <= before)) return;
       places_ = trial;
       before = after;
-      const double largest_move = move.lpNorm<Eigen::Infinity>();
-      if (largest_move < settled_mm) return;
-      factorised = step == 0 || largest_move < 0.1 * last_move;
-      last_move = largest_move;
+      if (move.lpNorm<Eigen::Infinity>() < settled_mm) return;
     }
   }
 
@@ -120,21 +116,62 @@ class Relaxation {
     return {root * along / (length * e.length_mm), root * (length / e.length_mm - 1)};
   }
 
-  Eigen::VectorXd gradient() const {
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(places_.size());
-    for (const Edge& e : edges_) {
-      const auto [g, residual] = derivative(e);
-      gradient.segment<2>(2 * e.to) += residual * g;
-      gradient.segment<2>(2 * e.from) -= residual * g;
+  /// The Gauss-Newton step from the present places. The matrix hardly changes from one to the next: an earlier one,
+  /// factorised, makes conjugate gradients converge in a few steps. It is factorised anew only where it does not.
+  Eigen::VectorXd next_move(bool factorised) {
+    Eigen::VectorXd pull = Eigen::VectorXd::Zero(places_.size());  // the gradient's opposite
+    derivatives_.resize(edges_.size());
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+      const auto [g, residual] = derivative(edges_[k]);
+      derivatives_[k] = g;
+      pull.segment<2>(2 * edges_[k].to) -= residual * g;
+      pull.segment<2>(2 * edges_[k].from) += residual * g;
     }
-    return gradient;
+    if (factorised)
+      if (auto move = conjugate_gradients(pull)) return *std::move(move);
+    factorise();
+    return cholesky_.solve(pull);
+  }
+
+  std::optional<Eigen::VectorXd> conjugate_gradients(Eigen::VectorXd left) const {
+    constexpr int most = 12;
+    constexpr double accuracy = 1e-3;
+    Eigen::VectorXd move = Eigen::VectorXd::Zero(left.size()), direction = cholesky_.solve(left);
+    double slope = left.dot(direction);
+    const double first = slope;
+    for (int step = 0; step < most && slope > 0; ++step) {
+      const Eigen::VectorXd bent = multiply(direction);
+      const double length = slope / direction.dot(bent);
+      move += length * direction;
+      left -= length * bent;
+      const Eigen::VectorXd scaled = cholesky_.solve(left);
+      const double next = left.dot(scaled);
+      if (!(next > accuracy * accuracy * first)) return move;
+      direction = scaled + next / slope * direction;
+      slope = next;
+    }
+    return std::nullopt;
+  }
+
+  Eigen::VectorXd multiply(const Eigen::VectorXd& v) const {
+    Eigen::VectorXd product = Eigen::VectorXd::Zero(v.size());
+    for (const int k : held_) product(k) += held_weight * v(k);
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+      const Edge& e = edges_[k];
+      const Eigen::Vector2d& g = derivatives_[k];
+      const Eigen::Vector2d force = g.dot(v.segment<2>(2 * e.to) - v.segment<2>(2 * e.from)) * g;
+      product.segment<2>(2 * e.to) += force;
+      product.segment<2>(2 * e.from) -= force;
+    }
+    return product;
   }
 
   void factorise() {
     std::vector<Eigen::Triplet<double>> entries;
     entries.reserve(16 * edges_.size());
-    for (const Edge& e : edges_) {
-      const Eigen::Vector2d g = derivative(e).first;
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+      const Edge& e = edges_[k];
+      const Eigen::Vector2d& g = derivatives_[k];
       for (const int row : {e.from, e.to})
         for (const int column : {e.from, e.to})
           for (int a = 0; a < 2; ++a)
@@ -142,7 +179,7 @@ class Relaxation {
               if (2 * row + a >= 2 * column + b)
                 entries.emplace_back(2 * row + a, 2 * column + b, (row == column ? 1 : -1) * g(a) * g(b));
     }
-    for (const int k : held_) entries.emplace_back(k, k, 1e3);
+    for (const int k : held_) entries.emplace_back(k, k, held_weight);
     Eigen::SparseMatrix<double> hessian(places_.size(), places_.size());
     hessian.setFromTriplets(entries.begin(), entries.end());
     if (!analysed_) cholesky_.analyzePattern(hessian);
@@ -152,6 +189,7 @@ class Relaxation {
 
   std::vector<Edge> edges_;
   Eigen::VectorXd places_;
+  std::vector<Eigen::Vector2d> derivatives_;  ///< of each edge's residual by its end `to`
   std::array<int, 3> held_{};
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> cholesky_;
   bool analysed_ = false;
