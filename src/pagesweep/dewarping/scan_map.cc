@@ -17,6 +17,8 @@ namespace {
 
 using Weights = std::array<double, 4>;
 
+constexpr int largest_pitch = 16;  // [page pixels]
+
 /// Positions in the scan at every `pitch`-th pixel of the page and one node around it.
 class Lattice {
  public:
@@ -25,7 +27,8 @@ class Lattice {
       : view_(view), occlusion_(occlusion), frame_(frame), pixels_per_mm_(pixels_per_mm), tolerance_px_(tolerance_px) {
     // Two nodes from one node of the surface to the next see what its spline does between them; where that is too much
     // for this lattice, the middle of a cell shows it.
-    pitch_ = static_cast<int>(std::clamp(view.surface().spacing_mm * pixels_per_mm / 2, 2.0, 16.0));
+    pitch_ = static_cast<int>(
+        std::clamp(view.surface().spacing_mm * pixels_per_mm / 2, 2.0, static_cast<double>(largest_pitch)));
     columns_ = (frame.width_px(pixels_per_mm) - 1) / pitch_ + 1;
     rows_ = (frame.height_px(pixels_per_mm) - 1) / pitch_ + 1;
     nodes_ = Image<Eigen::Vector2d>(columns_ + 3, rows_ + 3, Eigen::Vector2d::Zero());
@@ -119,21 +122,23 @@ class Lattice {
   Image<char> even_along_, even_down_;  ///< of four nodes each, at the first of them
 };
 
-constexpr int step_px = 4;  // pixels at a time, as compilers make vectors of them
-
-/// The Catmull-Rom cubic between the second and third of four samples, at k / pitch for k = 0 ... pitch - 1, and to the
-/// end of a step.
+/// The Catmull-Rom cubic between the second and third of four samples, at k / pitch for k = 0 ... count - 1.
 /// In float, what is large must come last.
-void fill_cubic(const std::array<double, 4>& p, int pitch, float* out) {
+template <int count>
+void fill_cubic(const std::array<double, 4>& p, float step, float* out) {
   const auto c0 = static_cast<float>(p[1]), c1 = static_cast<float>(0.5 * (p[2] - p[0]));
   const auto c2 = static_cast<float>(p[0] - 2.5 * p[1] + 2 * p[2] - 0.5 * p[3]);
   const auto c3 = static_cast<float>(0.5 * (p[3] - p[0]) + 1.5 * (p[1] - p[2]));
+  for (int k = 0; k < count; ++k) {
+    const float x = static_cast<float>(k) * step;
+    out[k] = c0 + x * (c1 + x * (c2 + x * c3));
+  }
+}
+
+/// The same for all pixels of a cell, and some beyond: loops of known length become vectors.
+void fill_cell(const std::array<double, 4>& p, int pitch, float* out) {
   const float step = 1 / static_cast<float>(pitch);
-  for (int begin = 0; begin < pitch; begin += step_px)
-    for (int k = begin; k < begin + step_px; ++k) {
-      const float x = static_cast<float>(k) * step;
-      out[k] = c0 + x * (c1 + x * (c2 + x * c3));
-    }
+  pitch <= largest_pitch / 2 ? fill_cubic<largest_pitch / 2>(p, step, out) : fill_cubic<largest_pitch>(p, step, out);
 }
 
 /// Fills the map's pixels in the j-th row of lattice cells.
@@ -142,15 +147,15 @@ void fill_cells(const Lattice& lattice, int j, ScanMap& map) {
   std::vector<char> smooth(static_cast<std::size_t>(lattice.columns()));
   for (int i = 0; i < lattice.columns(); ++i) smooth[static_cast<std::size_t>(i)] = lattice.is_smooth(i, j);
   std::vector<Eigen::Vector2d> row;
-  std::vector<float> u(static_cast<std::size_t>(lattice.columns() * pitch + step_px)), v = u;
+  std::vector<float> u(static_cast<std::size_t>(lattice.columns() * pitch + largest_pitch)), v = u;
   for (int y = j * pitch; y < std::min((j + 1) * pitch, map.height()); ++y) {
     lattice.interpolate_row(j, catmull_rom_weights(double(y - j * pitch) / pitch), row);
     for (int i = 0; i < lattice.columns(); ++i) {
       const auto begin = static_cast<std::size_t>(i * pitch), end = begin + static_cast<std::size_t>(pitch);
       if (smooth[static_cast<std::size_t>(i)]) {  // what it writes beyond the cell is the next one's
         const Eigen::Vector2d* p = &row[static_cast<std::size_t>(i)];
-        fill_cubic({p[0].x(), p[1].x(), p[2].x(), p[3].x()}, pitch, &u[begin]);
-        fill_cubic({p[0].y(), p[1].y(), p[2].y(), p[3].y()}, pitch, &v[begin]);
+        fill_cell({p[0].x(), p[1].x(), p[2].x(), p[3].x()}, pitch, &u[begin]);
+        fill_cell({p[0].y(), p[1].y(), p[2].y(), p[3].y()}, pitch, &v[begin]);
         continue;
       }
       for (std::size_t x = begin; x < end; ++x) {
