@@ -211,15 +211,23 @@ void sum_gray_lanes(const ResampleRun<std::uint8_t, std::int16_t>& run, std::int
 }
 #endif
 
-/// Either, with the loops unrolled for Lanczos' six taps.
+/// Calls use() with a kernel's taps as a constant, so that loops over them are unrolled, or with 0 if they are many.
+template <class Use>
+void unrolled(int taps, const Use& use) {
+  if (taps == 4) return use(std::integral_constant<int, 4>());
+  if (taps == 6) return use(std::integral_constant<int, 6>());
+  use(std::integral_constant<int, 0>());
+}
+
 template <class D, class T, class Weight>
 void sum_pixels(D d, const ResampleRun<T, Weight>& run, const LaneLayout& layout, Weight* sums) {
-  const bool six_taps = run.down->taps() == 6;
+  unrolled(run.down->taps(), [&](auto taps) {
 #if HWY_CAP_GE256 && !HWY_HAVE_SCALABLE
-  if constexpr (std::is_same_v<Weight, std::int16_t>)
-    if (run.channels == 1) return six_taps ? sum_gray_lanes<6>(run, sums) : sum_gray_lanes<0>(run, sums);
+    if constexpr (std::is_same_v<Weight, std::int16_t>)
+      if (run.channels == 1) return sum_gray_lanes<taps.value>(run, sums);
 #endif
-  six_taps ? sum_lanes<6>(d, run, layout, sums) : sum_lanes<0>(d, run, layout, sums);
+    sum_lanes<taps.value>(d, run, layout, sums);
+  });
 }
 
 /// Adds up the lanes of each channel. Going through memory costs least.
@@ -356,8 +364,8 @@ void sum_gray_run(const ResampleRun<T, float>& run) {
   constexpr std::size_t slack = hn::MaxLanes(hn::ScalableTag<float>());  // written, but not meant
   alignas(64) float sums[Lookups::most + slack];
   alignas(64) T samples[Lookups::most + slack];
-  const bool six_taps = run.down->taps() == 6 && run.across->taps() == 6;
-  six_taps ? sum_gray_vectors<6>(d, run, sums) : sum_gray_vectors<0>(d, run, sums);
+  const int taps = run.down->taps() == run.across->taps() ? run.down->taps() : 0;
+  unrolled(taps, [&](auto both) { sum_gray_vectors<both.value>(d, run, sums); });
   store_samples(sums, run.count, samples);
   std::copy_n(samples, run.count, run.out);
 }
