@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
+#include <malloc.h>
 
 #include <chrono>
 #include <cmath>
@@ -93,8 +94,15 @@ class Spread {
   Rig rig_ = sim::make_test_rig(1024);
 };
 
+/// Memory that is freed stays with the process, as the program has it while it makes pages (cli/memory.h).
+void keep_unused_memory() {
+  mallopt(M_MMAP_THRESHOLD, 1 << 25);
+  mallopt(M_TRIM_THRESHOLD, 1 << 29);
+}
+
 /// Two flat pages of 17 megapixels together, from points in memory.
 void points_to_pages(benchmark::State& state) {
+  keep_unused_memory();
   static const std::vector<PointMap> points = Spread::get().points();
   static const Picture scan = Spread::get().scan();
   const ThreadLimit limit(static_cast<int>(state.range(0)));
