@@ -108,58 +108,76 @@ Vector clamped(Vector x, float most) {
   return hn::Min(hn::Max(x, hn::Set(d, -most)), hn::Set(d, most));
 }
 
-/// Of the good bells those that have not gone astray, at most `batch.most_moved` frames.
-Mask keep_near(BellBatch& batch, std::size_t i, Mask good, Vector time) {
-  const Floats d;
-  const Mask near = hn::And(good, hn::Le(hn::Abs(time), hn::Set(d, batch.most_moved)));
-  hn::Store(hn::IfThenElseZero(near, time), d, &batch.time[i]);
-  hn::Store(hn::IfThenElseZero(near, hn::Set(d, 1.0F)), d, &batch.good[i]);
-  return near;
-}
-
 Mask good_bells(const BellBatch& batch, std::size_t i) {
   return hn::Gt(hn::Load(Floats(), &batch.good[i]), hn::Zero(Floats()));
+}
+
+/// Whether a bell still moves.
+bool is_open(const BellBatch& batch, std::size_t i) { return batch.good[i] > 0 && batch.arrived[i] == 0; }
+Mask open_bells(const BellBatch& batch, std::size_t i) {
+  const Floats d;
+  return hn::AndNot(hn::Gt(hn::Load(d, &batch.arrived[i]), hn::Zero(d)), good_bells(batch, i));
+}
+
+/// Replaces values of some bells.
+void keep(Mask mask, Vector values, Each& all, std::size_t i) {
+  const Floats d;
+  hn::Store(hn::IfThenElse(mask, values, hn::Load(d, &all[i])), d, &all[i]);
+}
+
+/// The scalar products of the least squares solution for the bells that still move: amplitude, background, slope.
+void project(const BellBatch& batch, const Places& places, Sums<3>& sums) {
+  const Floats d;
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  for (int bell = 0; bell < batch.count; ++bell) {
+    const auto i = static_cast<std::size_t>(bell);
+    if (!is_open(batch, i)) continue;
+    const BellTable& table = *batch.table[i];
+    const std::size_t row = places.entry(i, table);
+    const float *amplitude_weight = &table.amplitude_weight[row], *slope_weight = &table.slope_weight[row];
+    const float* background_weight = &table.background_weight[row];
+    const float* gray_row = batch.gray[i] + places.first(i, batch);
+    Vector part[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    for (int k = 0; k < table.length; k += lanes) {
+      const Vector gray = hn::LoadU(d, gray_row + k);
+      part[0] = hn::MulAdd(hn::LoadU(d, amplitude_weight + k), gray, part[0]);
+      part[1] = hn::MulAdd(hn::LoadU(d, background_weight + k), gray, part[1]);
+      part[2] = hn::MulAdd(hn::LoadU(d, slope_weight + k), gray, part[2]);
+    }
+    sums.put(bell, part);
+  }
 }
 
 void Approach(BellBatch& batch) {
   constexpr int most_steps = 6;
   const Floats d;
-  const auto lanes = static_cast<int>(hn::Lanes(d));
-  alignas(64) Each slope;
+  alignas(64) Each amplitudes, backgrounds, slopes;
   Places places;
   Sums<3> sums;
   bool is_near = false;
+  batch.arrived.fill(0);
   for (int step = 0; step < most_steps && !is_near; ++step) {
     find_places(batch, places);
-    for (int bell = 0; bell < batch.count; ++bell) {
-      const auto i = static_cast<std::size_t>(bell);
-      const BellTable& table = *batch.table[i];
-      const std::size_t row = places.entry(i, table);
-      const float *amplitude_weight = &table.amplitude_weight[row], *slope_weight = &table.slope_weight[row];
-      const float* background_weight = &table.background_weight[row];
-      const float* gray_row = batch.gray[i] + places.first(i, batch);
-      Vector part[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-      for (int k = 0; k < table.length; k += lanes) {
-        const Vector gray = hn::LoadU(d, gray_row + k);
-        part[0] = hn::MulAdd(hn::LoadU(d, amplitude_weight + k), gray, part[0]);
-        part[1] = hn::MulAdd(hn::LoadU(d, background_weight + k), gray, part[1]);
-        part[2] = hn::MulAdd(hn::LoadU(d, slope_weight + k), gray, part[2]);
-      }
-      sums.put(bell, part);
-    }
-    sums.total(0, batch.amplitude);
-    sums.total(1, batch.background);
-    sums.total(2, slope);
-    is_near = step > 0;
+    project(batch, places, sums);
+    sums.total(0, amplitudes);
+    sums.total(1, backgrounds);
+    sums.total(2, slopes);
+    is_near = true;
     for_bells([&](std::size_t i) {
       // A bell that is late by x has the slope -amplitude x in it.
-      const Vector amplitude = hn::Load(d, &batch.amplitude[i]);
-      const Vector late = hn::Neg(hn::Div(hn::Load(d, &slope[i]), amplitude));
+      const Vector amplitude = hn::Load(d, &amplitudes[i]), before = hn::Load(d, &batch.time[i]);
+      const Vector late = hn::Neg(hn::Div(hn::Load(d, &slopes[i]), amplitude));
       const Vector time = hn::Add(hn::Load(d, &places.time[i]), clamped(late, batch.longest_step));
-      const Vector moved = hn::Abs(hn::Sub(time, hn::Load(d, &batch.time[i])));
-      const Mask good = hn::And(good_bells(batch, i), hn::Gt(amplitude, hn::Zero(d)));
-      const Mask near = keep_near(batch, i, good, time);
-      is_near = is_near && hn::AllFalse(d, hn::And(near, hn::Ge(moved, hn::Set(d, batch.near))));
+      const Mask open = open_bells(batch, i);
+      const Mask good =
+          hn::And(open, hn::And(hn::Gt(amplitude, hn::Zero(d)), hn::Le(hn::Abs(time), hn::Set(d, batch.most_moved))));
+      keep(open, amplitude, batch.amplitude, i);
+      keep(open, hn::Load(d, &backgrounds[i]), batch.background, i);
+      keep(open, hn::IfThenElseZero(good, time), batch.time, i);
+      keep(open, hn::IfThenElseZero(good, hn::Set(d, 1.0F)), batch.good, i);
+      const Mask far = hn::And(good, hn::Ge(hn::Abs(hn::Sub(time, before)), hn::Set(d, batch.near)));
+      keep(hn::AndNot(far, good), hn::Set(d, 1.0F), batch.arrived, i);
+      is_near = is_near && hn::AllFalse(d, far);
     });
   }
 }
@@ -172,13 +190,6 @@ constexpr int sums_of(int extra_columns) { return extra_columns == 0 ? px : extr
 struct Equations {
   alignas(64) Each of[most_sums];
 };
-
-/// Whether a bell still moves.
-bool is_open(const BellBatch& batch, std::size_t i) { return batch.good[i] > 0 && batch.arrived[i] == 0; }
-Mask open_bells(const BellBatch& batch, std::size_t i) {
-  const Floats d;
-  return hn::AndNot(hn::Gt(hn::Load(d, &batch.arrived[i]), hn::Zero(d)), good_bells(batch, i));
-}
 
 /// The profile and its slope at samples x frames later than those of the table: Taylor's second order, the bend being
 /// the slope's change from sample to sample.
@@ -391,9 +402,6 @@ bool take_step(const Equations& e, BellBatch& batch, std::size_t i, bool may_arr
   const Floats d;
   const auto at = [i](const Each& values) { return hn::Load(Floats(), &values[i]); };
   const auto sum = [&](Sum which) { return at(e.of[which]); };
-  const auto keep = [&](Mask mask, Vector values, Each& all) {
-    hn::Store(hn::IfThenElse(mask, values, at(all)), d, &all[i]);
-  };
   const Mask open = open_bells(batch, i);
   const Vector p = sum(rp), b = sum(r1), s = sum(rs);
   // The inverse of a symmetric matrix by its cofactors, over the determinant.
@@ -415,20 +423,20 @@ bool take_step(const Equations& e, BellBatch& batch, std::size_t i, bool may_arr
   const Vector next = hn::Max(hn::Add(amplitude, by_amplitude), hn::Mul(hn::Set(d, 0.3F), amplitude));
   const Vector sigma = hn::Div(hn::Sqrt(hn::Mul(slopes, inverse)), amplitude);
   const Vector explained = dot(by_amplitude, p, by_background, b, by_slope, s);
-  keep(open, sigma, batch.sigma);
-  keep(open, batch.may_be_clipped ? sum(rr) : hn::Sub(sum(rr), explained), batch.chi_square);
+  keep(open, sigma, batch.sigma, i);
+  keep(open, batch.may_be_clipped ? sum(rr) : hn::Sub(sum(rr), explained), batch.chi_square, i);
   const Mask good = hn::And(open, hn::Gt(determinant, hn::Zero(d)));
-  keep(good, next, batch.amplitude);
-  keep(good, hn::Add(at(batch.background), by_background), batch.background);
+  keep(good, next, batch.amplitude, i);
+  keep(good, hn::Add(at(batch.background), by_background), batch.background, i);
   const Vector time = hn::Add(at(batch.time), step);
   const Mask near = hn::And(good, hn::Le(hn::Abs(time), hn::Set(d, batch.most_moved)));
-  keep(open, hn::IfThenElseZero(near, time), batch.time);
-  keep(open, hn::IfThenElseZero(near, hn::Set(d, 1.0F)), batch.good);
-  keep(hn::AndNot(near, good), time, batch.left_to);
+  keep(open, hn::IfThenElseZero(near, time), batch.time, i);
+  keep(open, hn::IfThenElseZero(near, hn::Set(d, 1.0F)), batch.good, i);
+  keep(hn::AndNot(near, good), time, batch.left_to, i);
   if (!may_arrive) return false;
   const Vector spread = hn::Sqrt(hn::Mul(aa, inverse));
   const Mask arrived = hn::And(near, are_small(batch, step, sigma, by_amplitude, next, spread));
-  keep(arrived, hn::Set(d, 1.0F), batch.arrived);
+  keep(arrived, hn::Set(d, 1.0F), batch.arrived, i);
   return hn::AllFalse(d, hn::AndNot(arrived, near));
 }
 

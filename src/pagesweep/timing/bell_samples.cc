@@ -39,6 +39,8 @@ void BellReader::read(const T* gray, int centre, float log_width, int slot, Bell
   if (most >= saturation)
     for (std::size_t k = 0; k < length; ++k)
       if (static_cast<float>(gray[k]) >= saturation) light[k] = std::numeric_limits<float>::infinity();
+  const int reach = bells_.reach(*samples.table);
+  samples.is_whole = windows_.are_present(centre - reach, 2 * reach + 1);
   samples.kind = kind_of(samples, most >= saturation && is_clipped(samples));
   const auto content = BellSamples::content_of(samples.kind);
   samples.start = content == Content::clipped ? plateau(samples) : 0;

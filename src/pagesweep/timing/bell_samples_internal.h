@@ -26,6 +26,7 @@ struct BellSamples {
   const float* light = nullptr;  ///< black level removed, from the window's first on; +infinity: clipped
   int start = 0;                 ///< [frames] after the centre where the bell's middle may be
   Kind kind = Kind::core;
+  bool is_whole = false;  ///< every frame is there that may be looked at
 };
 
 /// Reads them, up to `most_bells` at a time. One a thread.

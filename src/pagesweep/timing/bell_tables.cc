@@ -68,8 +68,8 @@ BellTables::BellTables(const StripeProfile& profile, double reach)
     : profile_(profile), reach_(reach), tables_(2 * steps_to_widest + 1) {}
 
 std::size_t BellTables::index_of(double log_width) {
-  const auto steps = static_cast<int>(std::lround(log_width / step));
-  return static_cast<std::size_t>(std::clamp(steps, -steps_to_widest, steps_to_widest) + steps_to_widest);
+  const double place = log_width * (1 / step) + steps_to_widest;
+  return static_cast<std::size_t>(std::clamp(place, 0.0, 2.0 * steps_to_widest) + 0.5);
 }
 
 void BellTables::cover(std::pair<double, double> widths) {

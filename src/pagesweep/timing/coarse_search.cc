@@ -83,7 +83,7 @@ int CoarseSearch::frame(int x, int y, int frame_count) const {
   const double before = before_(x, y), here = rise_(x, y), after = after_(x, y);
   const double bend = before - 2 * here + after;
   if (bend < 0) place += block_ * std::clamp(0.5 * (before - after) / bend, -0.5, 0.5);
-  return static_cast<int>(std::lround(std::clamp(place, 0.0, frame_count - 1.0)));
+  return static_cast<int>(std::clamp(place, 0.0, frame_count - 1.0) + 0.5);
 }
 
 }  // namespace pagesweep

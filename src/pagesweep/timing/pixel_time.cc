@@ -116,21 +116,34 @@ bool misfits(const BellPlace& place, const Bell& bell, const PixelJudge& judge, 
 double noise_limit(int samples) { return 1 + 4 * std::sqrt(2.0 / std::max(1, samples - 3)); }
 
 /// Whether it exceeds noise_limit(), without a root.
-bool is_beyond_noise(double reduced_chi_square, int samples) {
-  const double excess = reduced_chi_square - 1;
-  return excess * std::abs(excess) * std::max(1, samples - 3) > 4 * 4 * 2;
+/// \param freedom  samples less unknowns
+template <class Number>
+bool is_beyond_noise(Number reduced_chi_square, Number freedom) {
+  const Number excess = reduced_chi_square - 1;
+  return excess * std::abs(excess) * freedom > 4 * 4 * 2;
+}
+
+/// Of any bell-like stripe of width 1 the sum of the squared profile.
+double light_of(const PixelJudge& judge) { return 0.75 * judge.profile.full_width_half_maximum(); }
+
+/// \param light     sum of the squared profile, weighted
+/// \param variance  of the background
+template <class Number>
+bool is_lost_in_noise(Number amplitude, Number light, Number variance) {
+  return amplitude * amplitude * light < 25 * variance;
 }
 
 bool is_lost_in_noise(const Bell& bell, const PixelJudge& judge) {
-  // 0.75 times the width at half height: sum of the squared profile of any bell-like stripe.
-  const double light = 0.75 * judge.profile.full_width_half_maximum() * bell.width * judge.noise.mean_weight();
-  const double variance = judge.noise.sensor().variance(bell.background);
-  return bell.amplitude < 0 || bell.amplitude * bell.amplitude * light < 25 * variance;
+  const double light = light_of(judge) * bell.width * judge.noise.mean_weight();
+  return bell.amplitude < 0 || is_lost_in_noise(bell.amplitude, light, judge.noise.sensor().variance(bell.background));
+}
+
+double least_amplitude(const PixelJudge& judge) {
+  return std::max(judge.min_amplitude, 3.0);  // [gray values] below that, rounding makes the shape
 }
 
 bool is_too_faint(const Bell& bell, double sigma, const PixelJudge& judge) {
-  constexpr double least_amplitude = 3;  // [gray values] below that, rounding makes the shape
-  return bell.amplitude < std::max(judge.min_amplitude, least_amplitude) || sigma > judge.max_sigma;
+  return bell.amplitude < least_amplitude(judge) || sigma > judge.max_sigma;
 }
 
 /// [frames] by which a bell is later than eq. 3 finds it, which takes all frames to be exposed evenly: how late the
@@ -249,7 +262,7 @@ std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double w
   }
   const double chi_square = fit.chi_square / std::max(1, fit.samples - 3);
   double sigma = fit.time_sigma;
-  if (is_beyond_noise(chi_square, fit.samples)) {
+  if (is_beyond_noise(chi_square, std::max(1.0, fit.samples - 3.0))) {
     if (judge.refuse_misfits) return std::nullopt;
     sigma *= std::sqrt(chi_square / noise_limit(fit.samples));
   }
@@ -262,6 +275,29 @@ std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double w
                    .background = fit.background,
                    .bell_time = fit.time,
                    .status = dark ? PixelStatus::too_dark : PixelStatus::ok};
+}
+
+void judge_whole_bells(const BellBatch& batch, const PixelJudge& judge, BellVerdicts& verdicts) {
+  const SensorNoise& noise = judge.noise.sensor();
+  const auto read_variance = static_cast<float>(noise.read_variance), gain = static_cast<float>(noise.gain);
+  const auto light = static_cast<float>(light_of(judge)), most_sigma = static_cast<float>(judge.max_sigma);
+  const auto least = static_cast<float>(least_amplitude(judge));
+  BellBatch::Each<float> width, freedom;
+  width.fill(1);
+  freedom.fill(1);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(batch.count); ++i) {
+    width[i] = batch.table[i]->width * (1 + batch.width_rest[i]);
+    freedom[i] = static_cast<float>(std::max(1, 2 * batch.table[i]->reach + 1 - 3));
+  }
+  // No branches: four at once on any machine.
+  for (std::size_t i = 0; i < most_bells; ++i) {
+    const float amplitude = batch.amplitude[i], background = std::max(batch.background[i], 0.0F);
+    const float reduced_chi_square = std::max(batch.chi_square[i], 0.0F) / freedom[i];
+    verdicts.residual[i] = std::sqrt(reduced_chi_square);
+    verdicts.is_told[i] = (batch.good[i] > 0) & !is_beyond_noise(reduced_chi_square, freedom[i]);
+    verdicts.is_dark[i] = is_lost_in_noise(amplitude, light * width[i], read_variance + gain * background) |
+                          (amplitude < least) | (batch.sigma[i] > most_sigma);
+  }
 }
 
 PixelTime time_of_doubtful_bell(const PlainBells::Fit& first, const PlainBells::Fit& second,

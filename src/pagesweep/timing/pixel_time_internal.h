@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <optional>
 
@@ -70,6 +71,14 @@ PixelTime time_by_likelihood_around(int frame, const WindowAround& window_around
 /// What time_by_likelihood() says of a bell that was fitted as a plain one; nothing if it is not one, because its
 /// residuals are more than noise.
 std::optional<PixelTime> time_of_plain_bell(const PlainBells::Fit& fit, double width, const PixelJudge& judge);
+
+/// What time_of_plain_bell() says of bells of which no sample is missing, side by side.
+struct BellVerdicts {
+  BellBatch::Each<float> residual;        ///< rms over the noise expected
+  BellBatch::Each<std::int32_t> is_told;  ///< 0: there is more to say than what is here
+  BellBatch::Each<std::int32_t> is_dark;
+};
+void judge_whole_bells(const BellBatch& batch, const PixelJudge& judge, BellVerdicts& verdicts);
 
 /// What the samples say about a bell, whichever estimator found it: ok, or too_dark, truncated, saturated, bad_fit.
 /// A bell that five standard deviations of noise could have made is too dark, and so is one whose time is too

@@ -75,6 +75,8 @@ class PlainBells {
   /// The middle parts of bells on backgrounds that change while the stripe passes. \pre no sample was exposed later
   void fit_on_curved();
   int count() const { return batch_.count; }
+  const BellBatch& batch() const { return batch_; }
+  int centre(std::size_t i) const { return centre_[i]; }  ///< as add() had it
   Fit operator[](int i) const;
 
  private:

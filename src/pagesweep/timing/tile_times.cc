@@ -67,12 +67,17 @@ void TileTimes::fit(BellSamples::Kind kind, int y) {
   }
   if (fitted_.empty()) return;
   bells_.fit(BellSamples::content_of(kind));
+  judge_whole_bells(bells_.batch(), judge_, verdicts_);
   doubtful_.clear();
   for (std::size_t i = 0; i < fitted_.size(); ++i) {
     const Candidate& candidate = *fitted_[i];
+    if (kind == BellSamples::Kind::core && candidate.samples.is_whole && verdicts_.is_told[i] != 0) {
+      set_whole(candidate.x, y, i);
+      continue;
+    }
     const PlainBells::Fit bell = bells_[static_cast<int>(i)];
     auto time = time_of(candidate, bell);
-    if (!time && !candidate.may_be_noise && bell.converged && is_even(kind) && is_whole(candidate.samples)) {
+    if (!time && !candidate.may_be_noise && bell.converged && is_even(kind) && candidate.samples.is_whole) {
       doubtful_.push_back({&candidate, bell});
       continue;
     }
@@ -80,6 +85,17 @@ void TileTimes::fit(BellSamples::Kind kind, int y) {
     set_time(map_, candidate.x, y, *time);
   }
   ask_for_second_opinions(y);
+}
+
+/// Puts what the fit says into the map.
+void TileTimes::set_whole(int x, int y, std::size_t i) {
+  const BellBatch& bells = bells_.batch();
+  const bool ok = verdicts_.is_dark[i] == 0;
+  map_.status(x, y) = ok ? PixelStatus::ok : PixelStatus::too_dark;
+  map_.amplitude(x, y) = bells.amplitude[i];
+  map_.residual(x, y) = verdicts_.residual[i];
+  map_.time(x, y) = ok ? static_cast<float>(bells_.centre(i)) + bells.time[i] : not_a_number;
+  map_.sigma(x, y) = ok ? bells.sigma[i] : not_a_number;
 }
 
 void TileTimes::ask_for_second_opinions(int y) {
@@ -125,13 +141,8 @@ PixelTime TileTimes::look_closely(const Candidate& candidate, const PlainBells::
   return time_by_likelihood_around(alone_.frame(candidate.x), window_around, judge_);
 }
 
-bool TileTimes::is_whole(const BellSamples& samples) const {
-  const int reach = bells_.reach(*samples.table);
-  return windows_.are_present(samples.centre - reach, 2 * reach + 1);
-}
-
 bool TileTimes::is_recorded(const BellSamples& samples, double time, double width) const {
-  if (is_whole(samples)) return true;
+  if (samples.is_whole) return true;
   const int begin = static_cast<int>(std::floor(time + width * judge_.profile.begin()));
   const int end = static_cast<int>(std::ceil(time + width * judge_.profile.end()));
   return windows_.are_present(begin, end - begin + 1);

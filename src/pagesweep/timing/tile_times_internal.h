@@ -38,13 +38,12 @@ class TileTimes {
 
   void gather(int y, int left, int columns);
   void fit(BellSamples::Kind kind, int y);
+  void set_whole(int x, int y, std::size_t i);
   void ask_for_second_opinions(int y);
   /// The verdict of the fit, if it is one.
   std::optional<PixelTime> time_of(const Candidate& candidate, const PlainBells::Fit& bell) const;
   /// \param plain  its fit as a plain case, which did not do; null: there is none
   PixelTime look_closely(const Candidate& candidate, const PlainBells::Fit* plain = nullptr);
-  /// Whether every frame is there that may be looked at.
-  bool is_whole(const BellSamples& samples) const;
   /// Whether every frame is there that shows something of the bell.
   bool is_recorded(const BellSamples& samples, double time, double width) const;
   BellPlace place_of(const BellSamples& samples, double time) const;
@@ -61,6 +60,7 @@ class TileTimes {
   std::vector<Candidate> candidates_;
   std::vector<const Candidate*> fitted_;
   std::vector<Doubtful> doubtful_;
+  BellVerdicts verdicts_;
 };
 
 }  // namespace pagesweep
