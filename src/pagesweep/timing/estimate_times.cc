@@ -80,6 +80,19 @@ TimeMap estimate_from_whole_frames(const Frames& frames, const StripeProfile& pr
   return map;
 }
 
+/// Widths and times of one of the cameras whose stripe was learned.
+void estimate_camera(const Frames& frames, const TimingOptions& options, std::size_t i, Timing& timing) {
+  if (RecordedTimes::can_estimate(frames.sequence(), options)) {
+    RecordedTimes times(frames.sequence(), timing.profile, timing.noise[i], options);
+    times.finish(frames);
+    timing.widths[i] = std::move(times.widths());
+    timing.maps[i] = std::move(times.map());
+    return;
+  }
+  if (!options.uniform_width) timing.widths[i] = measure_widths(frames, timing.profile, timing.noise[i]);
+  timing.maps[i] = estimate_from_whole_frames(frames, timing.profile, timing.noise[i], timing.widths[i], options);
+}
+
 }  // namespace
 
 TimeMap estimate_times(const Frames& frames, const StripeProfile& profile, const SensorNoise& noise,
@@ -96,24 +109,18 @@ Timing estimate_times(std::span<const Frames> cameras, const TimingOptions& opti
   progress.begin("learning the stripe's profile");
   LearnedStripe learned = learn_stripe(cameras);
   Timing timing{std::move(learned.profile), std::move(learned.noise), {}, {}};
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const Frames& frames = cameras[i];
-    progress.begin(fmt::format("time values of {}", frames.sequence().camera));
+  for (const Frames& frames : cameras)
     if (frames.dropped() > 0)
       progress.warn(
           fmt::format("{}: {} of {} frames were dropped", frames.sequence().camera, frames.dropped(), frames.count()));
-    if (RecordedTimes::can_estimate(frames.sequence(), options)) {
-      RecordedTimes times(frames.sequence(), timing.profile, timing.noise[i], options);
-      times.finish(frames);
-      timing.widths.push_back(std::move(times.widths()));
-      timing.maps.push_back(std::move(times.map()));
-    } else {
-      timing.widths.push_back(options.uniform_width ? StripeWidths()
-                                                    : measure_widths(frames, timing.profile, timing.noise[i]));
-      timing.maps.push_back(
-          estimate_from_whole_frames(frames, timing.profile, timing.noise[i], timing.widths[i], options));
-    }
-  }
+  progress.begin("time values");
+  timing.widths.resize(cameras.size());
+  timing.maps.resize(cameras.size());
+  // Side by side, so that no thread waits while one makes room for a camera's maps.
+  parallel_rows(static_cast<int>(cameras.size()), [&](int camera) {
+    const auto i = static_cast<std::size_t>(camera);
+    estimate_camera(cameras[i], options, i, timing);
+  });
   return timing;
 }
 

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 
+#include "pagesweep/timing/sample_scans_internal.h"
 #include "pagesweep/timing/shift_equations.h"
 
 namespace pagesweep {
@@ -46,24 +48,22 @@ Flanks examine_flanks(const PixelWindow& window, const Bell& bell, const PixelJu
 Flanks examine_flanks(const BellPlace& place, const PixelJudge& judge) {
   const BellTable& table = *place.table;
   const float* slope = &table.slope[static_cast<std::size_t>(place.row * table.length)];
+  const int count = 2 * table.reach + 1;
+  const LostSlopes lost = lost_slopes(slope, place.gray, place.present, count);
   Flanks flanks;
-  for (int side = 0; side < 2; ++side) {
-    Flank& flank = flanks[static_cast<std::size_t>(side)];
-    flank.whole = flank.recorded = flank.usable = table.flank(side, place.row);
+  for (std::size_t side = 0; side < 2; ++side) {
+    Flank& flank = flanks[side];
+    flank.whole = flank.recorded = table.flank(static_cast<int>(side), place.row);
+    flank.clipped = static_cast<double>(lost.clipped[side]);
+    flank.usable = flank.whole - static_cast<double>(lost.absent[side]) - flank.clipped;
   }
-  for (int k = 0; k <= 2 * table.reach; ++k) {
-    const bool is_clipped = std::isinf(place.gray[k]);
-    if (place.present[k] > 0 && !is_clipped) continue;
-    Flank& flank = flanks[slope[k] > 0 ? 0 : 1];
-    const auto information = static_cast<double>(slope[k] * slope[k]);
-    flank.usable -= information;
-    if (place.present[k] > 0) {
-      flank.clipped += information;
-      continue;
-    }
-    const int frame = place.first_frame + k;
-    if (frame < 0 || frame >= judge.frame_count) flank.recorded -= information;
-  }
+  const auto take_off = [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) flanks[slope[k] > 0 ? 0 : 1].recorded -= static_cast<double>(slope[k] * slope[k]);
+  };
+  const int end =
+      static_cast<int>(std::clamp<std::int64_t>(std::int64_t{judge.frame_count} - place.first_frame, 0, count));
+  take_off(0, std::clamp(-place.first_frame, 0, count));
+  take_off(end, count);
   return flanks;
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "pagesweep/timing/plain_bells_internal.h"
+#include "pagesweep/timing/sample_scans_internal.h"
 #include "pagesweep/timing/stripe_width.h"
 
 namespace pagesweep {
@@ -83,21 +83,11 @@ void PlainBells::fit_on_curved() {
 }
 
 void PlainBells::start_from_extremes(std::size_t i) {
-  float low = std::numeric_limits<float>::infinity(), high = 0;
-  int clipped = 0;
-  const int around = reach(*batch_.table[i]);
-  for (int k = reach() - around; k <= reach() + around; ++k) {
-    if (batch_.present[i][k] == 0) continue;
-    const float gray = batch_.gray[i][k];
-    if (std::isinf(gray)) {
-      ++clipped;
-      continue;
-    }
-    low = std::min(low, gray);
-    high = std::max(high, gray);
-  }
+  const int around = reach(*batch_.table[i]), first = reach() - around;
+  const auto [low, high, seen, clipped] =
+      scan_samples(batch_.gray[i] + first, batch_.present[i] + first, 2 * around + 1);
   batch_.background[i] = low;
-  batch_.good[i] = std::isfinite(low) ? 1.0F : 0.0F;
+  batch_.good[i] = seen > 0 ? 1.0F : 0.0F;
   batch_.amplitude[i] = std::max(high - low, 1.0F);
   if (clipped == 0) return;
   // The longer the plateau, the higher the bell must be that was cut off there.
@@ -114,13 +104,7 @@ int PlainBells::count_samples(std::size_t i) const {
     first = std::max(first, static_cast<int>(std::ceil(middle - batch_.core[i])));
     last = std::min(last, static_cast<int>(std::floor(middle + batch_.core[i])));
   }
-  int samples = 0;
-  const float *present = batch_.present[i], *gray = batch_.gray[i];
-  if (!batch_.may_be_clipped)
-    for (int n = first; n <= last; ++n) samples += present[n] > 0;
-  else
-    for (int n = first; n <= last; ++n) samples += present[n] > 0 && !std::isinf(gray[n]);
-  return samples;
+  return scan_samples(batch_.gray[i] + first, batch_.present[i] + first, last - first + 1).seen;
 }
 
 PlainBells::Fit PlainBells::operator[](int k) const {

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "pagesweep/base/parallel.h"
 #include "pagesweep/timing/learn_profile.h"
 #include "pagesweep/timing/recorded_times_internal.h"
 
@@ -53,7 +54,7 @@ void TimeStream::add(FrameSet set) {
   if (!follows_) return;
   const int end = set.index + 1;
   if (!learned_ || end - looked_at_ < frames_a_step) return;
-  for (std::size_t c = 0; c < frames_.size(); ++c) look(c, end);
+  parallel_rows(static_cast<int>(frames_.size()), [&](int c) { look(static_cast<std::size_t>(c), end); });
   looked_at_ = end;
 }
 
