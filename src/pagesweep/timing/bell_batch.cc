@@ -250,21 +250,27 @@ HWY_INLINE void add(const Samples& s, Vector (&part)[count]) {
 HWY_INLINE void censor(Mask clipped, Vector excess, Vector precision, Samples& samples) {
   const Floats d;
   const Integers integers;
-  const Vector root = hn::Sqrt(precision), z = hn::Mul(excess, root);
-  const Vector lowest = hn::Set(d, MillsRatio::lowest);
-  const Vector within = hn::Min(hn::Max(z, lowest), hn::Set(d, MillsRatio::highest));
-  const Vector place = hn::Mul(hn::Sub(within, lowest), hn::Set(d, MillsRatio::steps)), whole = hn::Floor(place);
-  const auto index = hn::ConvertTo(integers, whole);
-  const float* table = MillsRatio::inverse();
-  const Vector below = hn::GatherIndex(d, table, index), above = hn::GatherIndex(d, table + 1, index);
-  const Vector ratio = hn::MulAdd(hn::Sub(place, whole), hn::Sub(above, below), below);
-  // Beyond 5 it had to be clipped and tells nothing; below the table the ratio is -z, nearly.
-  const Mask told = hn::And(clipped, hn::Lt(z, hn::Set(d, MillsRatio::highest)));
-  const Vector weight = hn::Mul(hn::Mul(ratio, hn::Add(ratio, within)), precision);
-  const Vector pull = hn::Mul(hn::Add(ratio, hn::Max(hn::Sub(lowest, z), hn::Zero(d))), root);
-  samples.weight = hn::IfThenElse(clipped, hn::IfThenElseZero(told, weight), samples.weight);
-  samples.pull = hn::IfThenElse(clipped, hn::IfThenElseZero(told, pull), samples.pull);
+  samples.weight = hn::IfThenZeroElse(clipped, samples.weight);
+  samples.pull = hn::IfThenZeroElse(clipped, samples.pull);
   samples.residual = hn::IfThenZeroElse(clipped, samples.residual);
+  const Vector root = hn::Sqrt(precision), z = hn::Mul(excess, root);
+  const Vector lowest = hn::Set(d, MillsRatio::lowest), highest = hn::Set(d, MillsRatio::highest);
+  // Beyond that it had to be clipped and tells nothing.
+  const Mask told = hn::And(clipped, hn::Lt(z, highest));
+  if (hn::AllFalse(d, told)) return;
+  const Vector within = hn::Min(hn::Max(z, lowest), highest);
+  const Vector steps = hn::Set(d, MillsRatio::steps), half = hn::Set(d, 0.5F);
+  const auto index = hn::ConvertTo(integers, hn::MulAdd(hn::Sub(within, lowest), steps, half));
+  const Vector node = hn::Add(hn::Mul(hn::ConvertTo(d, index), hn::Set(d, 1 / MillsRatio::steps)), lowest);
+  const Vector at_node = hn::GatherIndex(d, MillsRatio::inverse(), index);
+  // The ratio's derivative is -ratio (ratio + z).
+  const Vector bend = hn::Mul(at_node, hn::Add(at_node, node));
+  const Vector ratio = hn::NegMulAdd(hn::Sub(within, node), bend, at_node);
+  const Vector weight = hn::Mul(hn::Mul(ratio, hn::Add(ratio, within)), precision);
+  // Below the table the ratio is -z, nearly.
+  const Vector pull = hn::Mul(hn::Add(ratio, hn::Max(hn::Sub(lowest, z), hn::Zero(d))), root);
+  samples.weight = hn::IfThenElse(told, weight, samples.weight);
+  samples.pull = hn::IfThenElse(told, pull, samples.pull);
 }
 
 /// One bell while its samples are summed.

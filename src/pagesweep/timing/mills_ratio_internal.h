@@ -6,7 +6,7 @@ namespace pagesweep {
 /// phi(z) / Phi(z) of the standard normal distribution.
 double inverse_mills_ratio(double z);
 
-/// The same as a table for single precision: between two entries it is a straight line to 4e-5.
+/// The same as a table for single precision: from the nearest entry on it is a straight line to 4e-5.
 struct MillsRatio {
   static constexpr float lowest = -8, highest = 5, steps = 32;  ///< of z; entries a unit
   /// From z = lowest on to one entry beyond highest.
