@@ -14,7 +14,6 @@ PlainBells::PlainBells(const BellTables& tables, const SensorNoise& noise, doubl
       most_late_(0.07 * fwhm),                                // Taylor's third order: 1e-3 of the height
       core_(static_cast<float>(core_widths * fwhm)) {
   batch_.middle = tables.longest_reach() + margin_;
-  batch_.most_moved = static_cast<float>(margin_);
   batch_.near = static_cast<float>(0.05 * fwhm);
   batch_.curvature = static_cast<float>(0.01 * fwhm);
   batch_.longest_step = static_cast<float>(0.3 * fwhm);
@@ -59,7 +58,13 @@ void PlainBells::start(Content content) {
   batch_.least_steps = content == Content::whole ? 1 : 2;
   batch_.left_to.fill(0);
   std::fill_n(batch_.good.begin(), batch_.count, 1.0F);
+  batch_.most_moved = static_cast<float>(margin_);
   if (content == Content::whole) return approach(batch_);
+  // A bell that the recording's end has cut, or a plateau, may be far from where it was expected. There are samples.
+  int reach_here = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(batch_.count); ++i)
+    reach_here = std::max(reach_here, batch_.table[i]->reach);
+  batch_.most_moved = static_cast<float>(batch_.middle - reach_here);
   for (std::size_t i = 0; i < static_cast<std::size_t>(batch_.count); ++i) start_from_extremes(i);
 }
 
@@ -75,6 +80,7 @@ void PlainBells::fit_widths(Content content) {
 
 void PlainBells::fit_on_curved() {
   is_on_curved_ = true;
+  batch_.most_moved = static_cast<float>(margin_);
   batch_.may_be_clipped = true;
   std::fill_n(batch_.good.begin(), batch_.count, 1.0F);
   batch_.tilt.fill(0);
