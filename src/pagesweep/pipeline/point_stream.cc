@@ -62,7 +62,8 @@ PointStream::PointStream(const std::vector<RayTable>& cameras, const ScanOptions
       matching_(cameras[0], cameras[1], options.matching),
       calibration_(static_cast<std::size_t>(cameras[0].width()) * static_cast<std::size_t>(cameras[0].height()) +
                    static_cast<std::size_t>(cameras[1].width()) * static_cast<std::size_t>(cameras[1].height())) {
-  for (std::size_t c = 0; c < sides_.size(); ++c) {
+  parallel_ranges(static_cast<int>(sides_.size()), 1, [&](int begin, int) {  // getting the memory takes a while
+    const auto c = static_cast<std::size_t>(begin);
     const int width = cameras[c].width(), height = cameras[c].height();
     Side& side = sides_[c];
     if (steps.corrects_edges) {
@@ -75,7 +76,7 @@ PointStream::PointStream(const std::vector<RayTable>& cameras, const ScanOptions
     side.points = PointMap(width, height);
     side.points.intensity = {};
     if (!steps.fits_normals) side.points.nx = side.points.ny = side.points.nz = {};
-  }
+  });
 }
 
 void PointStream::follow(const Times& seen, double known_until) {

@@ -131,12 +131,18 @@ EdgeComparisons gather_rows(int height, const std::function<void(int begin, int 
   parallel_ranges(height, rows_at_once, [&](int begin, int end) {
     compare(begin, end, parts[static_cast<std::size_t>(begin / rows_at_once)]);
   });
-  EdgeComparisons all;
-  for (const EdgeComparisons& part : parts) all.insert(all.end(), part.begin(), part.end());
+  std::vector<std::size_t> begins{0};
+  for (const EdgeComparisons& part : parts) begins.push_back(begins.back() + part.size());
+  EdgeComparisons all(begins.back());
+  parallel_ranges(static_cast<int>(parts.size()), 8, [&](int begin, int end) {
+    for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k)
+      std::ranges::copy(parts[k], all.begin() + static_cast<std::ptrdiff_t>(begins[k]));
+  });
   return all;
 }
 
 constexpr int plane_radius_px = 3;
+constexpr int edges_at_once = 4096;
 
 }  // namespace
 
@@ -145,6 +151,15 @@ struct EdgeFit::Sums {
   double ll = 0, lm = 0, mm = 0;  ///< leaning and misfit
   double fourth = 0, excess = 0;  ///< leaning^4, leaning^2 (rest^2 - 1)
   long long count = 0;
+
+  void operator+=(const Sums& more) {
+    ll += more.ll;
+    lm += more.lm;
+    mm += more.mm;
+    fourth += more.fourth;
+    excess += more.excess;
+    count += more.count;
+  }
 };
 
 SpotOffsets offsets_from_amplitude(const TimeMap& times) {
@@ -185,10 +200,10 @@ void EdgeFit::add(const TimeMap& times, const EdgeComparisons& comparisons) {
   }
 }
 
-/// Sums over the edges whose rest, with that gain, is within `limit` sigmas.
-EdgeFit::Sums EdgeFit::gather(double gain, double limit) const {
+/// Sums over some edges whose rest, with that gain, is within `limit` sigmas.
+EdgeFit::Sums EdgeFit::sum(std::span<const Edge> edges, double gain, double limit) {
   Sums sums;
-  for (const auto& [leaning_sigmas, misfit_sigmas] : edges_) {
+  for (const auto& [leaning_sigmas, misfit_sigmas] : edges) {
     const double leaning = leaning_sigmas, misfit = misfit_sigmas, rest = misfit - gain * leaning;
     if (!(std::abs(rest) < limit)) continue;
     const double square = leaning * leaning;
@@ -199,6 +214,18 @@ EdgeFit::Sums EdgeFit::gather(double gain, double limit) const {
     sums.excess += square * (rest * rest - 1);
     ++sums.count;
   }
+  return sums;
+}
+
+EdgeFit::Sums EdgeFit::gather(double gain, double limit) const {
+  const auto count = static_cast<int>(edges_.size());
+  std::vector<Sums> parts((edges_.size() + edges_at_once - 1) / edges_at_once);
+  parallel_ranges(count, edges_at_once, [&](int begin, int end) {
+    const auto some = std::span(edges_).subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin));
+    parts[static_cast<std::size_t>(begin / edges_at_once)] = sum(some, gain, limit);
+  });
+  Sums sums;
+  for (const Sums& part : parts) sums += part;
   return sums;
 }
 
@@ -234,7 +261,7 @@ EdgeCorrection fit_edges(const TimeMap& times, const EdgeComparisons& comparison
 
 void correct_edges(TimeMap& times, const EdgeComparisons& comparisons, const EdgeCorrection& correction) {
   if (!(correction.gain > 0)) return;
-  for (const EdgeComparison& seen : comparisons) {
+  const auto correct = [&](const EdgeComparison& seen) {
     const double shift = correction.gain * seen.leaning;
     // On two surfaces the spot's middle is somewhere in the pixel: evenly distributed over it, at most.
     const double off_px = std::min(correction.gain * seen.offset_px, 1 / std::sqrt(12.0));
@@ -242,7 +269,10 @@ void correct_edges(TimeMap& times, const EdgeComparisons& comparisons, const Edg
     float& sigma = times.sigma(seen.x, seen.y);
     sigma = static_cast<float>(std::hypot(sigma, doubt));
     if (seen.one_surface) times.time(seen.x, seen.y) -= static_cast<float>(shift);
-  }
+  };
+  parallel_ranges(static_cast<int>(comparisons.size()), edges_at_once, [&](int begin, int end) {
+    std::for_each(comparisons.begin() + begin, comparisons.begin() + end, correct);
+  });
 }
 
 }  // namespace pagesweep

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "pagesweep/data/pixel_set.h"
@@ -59,6 +60,7 @@ class EdgeFit {
     float leaning, misfit;  ///< both over the time value's sigma
   };
   struct Sums;
+  static Sums sum(std::span<const Edge> edges, double gain, double limit);
   Sums gather(double gain, double limit) const;
 
   std::vector<Edge> edges_;

@@ -113,13 +113,20 @@ class SweepFit {
   /// On all threads.
   template <class Body>
   void for_each_crossing(const Body& body) const {
-    parallel_ranges(static_cast<int>(crossings_.size()), 4096, [&](int begin, int end) {
+    parallel_ranges(static_cast<int>(crossings_.size()), at_once, [&](int begin, int end) {
       for (int k = begin; k < end; ++k) body(static_cast<std::size_t>(k));
     });
   }
   double relative(double time) const { return 2 * (time - begin_) / (end_ - begin_) - 1; }
   int spline_count() const { return splines_.size(); }
 
+  /// Least squares: normal unknowns = right; of the matrix, the lower half.
+  struct Equations {
+    Eigen::MatrixXd normal;
+    Eigen::VectorXd right;
+  };
+  static void add(const Crossing& s, double weight, Equations& equations);
+  Equations sum(const std::vector<double>& robust) const;
   void solve(const std::vector<double>& robust);
   double way_at(double time) const {
     const BSplineRow row = splines_.at(time);
@@ -148,6 +155,8 @@ class SweepFit {
     return {normal.normalized(), way_at(time) / normal.norm()};
   }
 
+  static constexpr int at_once = 4096;  ///< crossings
+
   std::vector<Crossing> crossings_;
   double begin_, end_;
   CubicBSplines splines_;
@@ -157,25 +166,40 @@ class SweepFit {
   std::int64_t used_ = 0;
 };
 
+void SweepFit::add(const Crossing& s, double weight, Equations& equations) {
+  std::array<double, 8> value{-s.point.y(), -s.relative * s.point.y(), -s.point.z(), -s.relative * s.point.z()};
+  std::array<int, 8> place{0, 1, 2, 3};
+  for (std::size_t j = 0; j < 4; ++j) {
+    value[4 + j] = s.spline[j];
+    place[4 + j] = 4 + s.first + static_cast<int>(j);
+  }
+  for (std::size_t i = 0; i < 8; ++i) {
+    equations.right[place[i]] += weight * value[i] * s.point.x();
+    for (std::size_t j = 0; j <= i; ++j) equations.normal(place[i], place[j]) += weight * value[i] * value[j];
+  }
+}
+
+/// Parts are summed side by side, and then in their order.
+SweepFit::Equations SweepFit::sum(const std::vector<double>& robust) const {
+  const int count = 4 + spline_count(), crossings = static_cast<int>(crossings_.size());
+  const Equations none{Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  std::vector<Equations> parts(static_cast<std::size_t>((crossings + at_once - 1) / at_once), none);
+  parallel_ranges(crossings, at_once, [&](int begin, int end) {
+    Equations& part = parts[static_cast<std::size_t>(begin / at_once)];
+    for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k)
+      if (robust[k] != 0) add(crossings_[k], robust[k] * crossings_[k].weight, part);
+  });
+  Equations all = none;
+  for (const Equations& part : parts) {
+    all.normal += part.normal;
+    all.right += part.right;
+  }
+  return all;
+}
+
 void SweepFit::solve(const std::vector<double>& robust) {
   const int count = 4 + spline_count();
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(count, count);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
-  for (std::size_t k = 0; k < crossings_.size(); ++k) {
-    const Crossing& s = crossings_[k];
-    const double weight = robust[k] * s.weight, r = s.relative;
-    if (weight == 0) continue;
-    std::array<double, 8> value{-s.point.y(), -r * s.point.y(), -s.point.z(), -r * s.point.z()};
-    std::array<int, 8> place{0, 1, 2, 3};
-    for (std::size_t j = 0; j < 4; ++j) {
-      value[4 + j] = s.spline[j];
-      place[4 + j] = 4 + s.first + static_cast<int>(j);
-    }
-    for (std::size_t i = 0; i < 8; ++i) {
-      right[place[i]] += weight * value[i] * s.point.x();
-      for (std::size_t j = 0; j <= i; ++j) normal(place[i], place[j]) += weight * value[i] * value[j];
-    }
-  }
+  auto [normal, right] = sum(robust);
   // A slope of about 1 is as good as known beforehand; frames without points take their neighbours' speed.
   for (int i = 0; i < 4; ++i) normal(i, i) += 10;
   const std::vector<double> weights(splines_.breaks().size() - 1, 1.0);
