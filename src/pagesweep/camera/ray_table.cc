@@ -26,8 +26,9 @@ RayTable::RayTable(const Camera& camera) : camera_(camera), directions_(camera.w
 }
 
 Eigen::Vector2d RayTable::direction_at(const Eigen::Vector2d& pixel) const {
-  const int x = std::clamp(static_cast<int>(std::floor(pixel.x())), 0, std::max(0, width() - 2));
-  const int y = std::clamp(static_cast<int>(std::floor(pixel.y())), 0, std::max(0, height() - 2));
+  // Cut off, not rounded down: below 0 both end at 0.
+  const int x = std::clamp(static_cast<int>(pixel.x()), 0, std::max(0, width() - 2));
+  const int y = std::clamp(static_cast<int>(pixel.y()), 0, std::max(0, height() - 2));
   const int right = std::min(x + 1, width() - 1), below = std::min(y + 1, height() - 1);
   const double a = pixel.x() - x, b = pixel.y() - y;
   return (1 - b) * ((1 - a) * direction(x, y) + a * direction(right, y)) +
