@@ -37,6 +37,10 @@ class ImageView {
   std::ptrdiff_t stride_ = 0;
 };
 
+/// Asks for an image that somebody else fills, see Image.
+struct Unfilled {};
+inline constexpr Unfilled unfilled;
+
 /// A row-major 2d array that owns its pixels: contiguous, the first one 64-byte aligned. Copies are deep.
 template <class T>
 class Image {
@@ -51,6 +55,8 @@ class Image {
   Image(int width, int height, T fill) : Image(Allocate{}, width, height) {
     std::uninitialized_fill_n(data(), size(), fill);
   }
+  /// Pixels are what the memory held: all of them must be written before any is read.
+  Image(int width, int height, Unfilled) : Image(Allocate{}, width, height) {}
   Image(const Image& other) : Image(Allocate{}, other.width_, other.height_) {
     std::uninitialized_copy_n(other.data(), size(), data());
   }

@@ -10,7 +10,7 @@
 #include "pagesweep/camera/valid_radius.h"
 
 namespace pagesweep {
-RayTable::RayTable(const Camera& camera) : camera_(camera), directions_(camera.width, camera.height) {
+RayTable::RayTable(const Camera& camera) : camera_(camera), directions_(camera.width, camera.height, unfilled) {
   const double valid = largest_valid_radius_squared(camera.distortion);
   parallel_rows(camera.height, [&](int y) {
     const PixelRow row{-camera.cx / camera.fx, 1 / camera.fx, (y - camera.cy) / camera.fy};

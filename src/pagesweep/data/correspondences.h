@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "pagesweep/base/image.h"
+#include "pagesweep/base/filled_image.h"
 #include "pagesweep/data/time_map.h"
 
 namespace pagesweep {
@@ -11,11 +11,11 @@ namespace pagesweep {
 struct Correspondences {
   Correspondences() = default;
   Correspondences(int width, int height)
-      : u(width, height, not_a_number),
-        v(width, height, not_a_number),
-        sigma(width, height, not_a_number),
-        slope(width, height, not_a_number),
-        status(width, height, PixelStatus::not_computed) {}
+      : u(filled_image(width, height, not_a_number)),
+        v(filled_image(width, height, not_a_number)),
+        sigma(filled_image(width, height, not_a_number)),
+        slope(filled_image(width, height, not_a_number)),
+        status(filled_image(width, height, PixelStatus::not_computed)) {}
   int width() const { return u.width(); }
   int height() const { return u.height(); }
 

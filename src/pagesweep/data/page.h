@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "pagesweep/base/image.h"
+#include "pagesweep/base/filled_image.h"
 #include "pagesweep/data/picture.h"
 #include "pagesweep/data/status.h"
 #include "pagesweep/data/time_map.h"
@@ -11,7 +11,8 @@ namespace pagesweep {
 /// For each pixel of a flat page, the place in the scan where that spot of paper is imaged; NaN where hidden.
 struct ScanMap {
   ScanMap() = default;
-  ScanMap(int width, int height) : u(width, height, not_a_number), v(width, height, not_a_number) {}
+  ScanMap(int width, int height)
+      : u(filled_image(width, height, not_a_number)), v(filled_image(width, height, not_a_number)) {}
   int width() const { return u.width(); }
   int height() const { return u.height(); }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "pagesweep/base/image.h"
+#include "pagesweep/base/filled_image.h"
 #include "pagesweep/data/time_map.h"
 
 namespace pagesweep {
@@ -11,15 +11,15 @@ namespace pagesweep {
 struct PointMap {
   PointMap() = default;
   PointMap(int width, int height)
-      : x(width, height, not_a_number),
-        y(width, height, not_a_number),
-        z(width, height, not_a_number),
-        nx(width, height, not_a_number),
-        ny(width, height, not_a_number),
-        nz(width, height, not_a_number),
-        intensity(width, height, not_a_number),
-        sigma(width, height, not_a_number),
-        status(width, height, PixelStatus::not_computed) {}
+      : x(filled_image(width, height, not_a_number)),
+        y(filled_image(width, height, not_a_number)),
+        z(filled_image(width, height, not_a_number)),
+        nx(filled_image(width, height, not_a_number)),
+        ny(filled_image(width, height, not_a_number)),
+        nz(filled_image(width, height, not_a_number)),
+        intensity(filled_image(width, height, not_a_number)),
+        sigma(filled_image(width, height, not_a_number)),
+        status(filled_image(width, height, PixelStatus::not_computed)) {}
   int width() const { return x.width(); }
   int height() const { return x.height(); }
 

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "pagesweep/base/image.h"
+#include "pagesweep/base/filled_image.h"
 #include "pagesweep/data/status.h"
 
 namespace pagesweep {
@@ -14,11 +14,11 @@ inline constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
 struct TimeMap {
   TimeMap() = default;
   TimeMap(int width, int height)
-      : time(width, height, not_a_number),
-        sigma(width, height, not_a_number),
-        amplitude(width, height, not_a_number),
-        residual(width, height, not_a_number),
-        status(width, height, PixelStatus::not_computed) {}
+      : time(filled_image(width, height, not_a_number)),
+        sigma(filled_image(width, height, not_a_number)),
+        amplitude(filled_image(width, height, not_a_number)),
+        residual(filled_image(width, height, not_a_number)),
+        status(filled_image(width, height, PixelStatus::not_computed)) {}
   int width() const { return time.width(); }
   int height() const { return time.height(); }
 

@@ -138,14 +138,8 @@ TwoWayMatching::TwoWayMatching(const RayTable& first, const RayTable& second, co
       range_is_known_(options.near_mm > 0 && options.far_mm > 0),
       there_(first, second, {}),
       back_(second, first, {}) {
-  const RayTable* cameras[] = {&first, &second};
-  Correspondences* matches[] = {&pair_.from_first, &pair_.from_second};
-  Image<PixelStatus>* found[] = {&found_.first, &found_.second};
-  // Getting the memory takes as long as anything else does.
-  parallel_ranges(2, 1, [&](int k, int) {
-    *matches[k] = Correspondences(cameras[k]->width(), cameras[k]->height());
-    *found[k] = matches[k]->status;
-  });
+  pair_ = {Correspondences(first.width(), first.height()), Correspondences(second.width(), second.height())};
+  found_ = {pair_.from_first.status, pair_.from_second.status};
 }
 
 void TwoWayMatching::match(const PixelMatcher& from_first, const PixelMatcher& from_second, Progress& progress) {
