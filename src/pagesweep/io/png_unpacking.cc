@@ -106,7 +106,7 @@ std::optional<Image<T>> unpack_gray_png(std::string_view bytes, int width, int h
   filtered.resize(filtered_bytes * static_cast<std::size_t>(height));
   if (!inflate(packed, filtered)) return std::nullopt;
 
-  Image<T> image(width, height);
+  Image<T> image(width, height, unfilled);
   const Image<T> nothing(width, 1, 0);
   const auto bytes_of = [](const T& sample) { return reinterpret_cast<const std::uint8_t*>(&sample); };
   for (int y = 0; y < height; ++y) {
