@@ -75,6 +75,7 @@ void PlainBells::fit(Content content) {
 
 void PlainBells::fit_widths(Content content) {
   start(content);
+  batch_.most_moved = static_cast<float>(margin_);  // tables change on the way: there must be samples for the widest
   refine_widths(batch_);
 }
 
