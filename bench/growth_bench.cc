@@ -27,10 +27,6 @@ void measure(const std::string& what, const std::array<double, 4>& sizes, const 
   report.add({what + ": exponent", "", exponents(sizes, seconds), most_exponent});
 }
 
-std::vector<RayTable> rays_of(const SyntheticScene& scene) {
-  return {scene.rig.cameras.begin(), scene.rig.cameras.end()};
-}
-
 /// Given, and not found automatically: these are the same for pictures of all sizes. A millimetre is 2 px of an
 /// epipolar curve: in no picture it leaves before its end, which would make the small ones easier than the large ones.
 MatchOptions depths_around_table(double range_mm) {

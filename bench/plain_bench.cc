@@ -111,10 +111,6 @@ void compare_sequences(const SyntheticScene& scene, const std::vector<RayTable>&
                   ours, plainly, scene, rays, settings, report);
 }
 
-std::vector<RayTable> rays_of(const SyntheticScene& scene) {
-  return {scene.rig.cameras.begin(), scene.rig.cameras.end()};
-}
-
 }  // namespace
 
 void measure_plain_code(const Settings& settings, Report& report) {

@@ -23,12 +23,12 @@ double between(const Image<float>& image, double u, double v) {
   return (1 - b) * ((1 - a) * at(0, 0) + a * at(1, 0)) + b * ((1 - a) * at(0, 1) + a * at(1, 1));
 }
 
-/// Leaves what the other direction confirms.
-/// \return whether the place that (x, y) is matched with is matched with (x, y)
+/// Whether the place that (x, y) is matched with is matched with (x, y)
 bool agrees(const Correspondences& back, double u, double v, int x, int y) {
   return std::hypot(between(back.u, u, v) - x, between(back.v, u, v) - y) <= most_disagreement_px;
 }
 
+/// Leaves what the other direction confirms.
 void keep_agreeing(Correspondences& there, const Correspondences& back) {
   for (int y = 0; y < there.height(); ++y)
     for (int x = 0; x < there.width(); ++x)

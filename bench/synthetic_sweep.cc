@@ -117,6 +117,10 @@ SyntheticScene make_scene(int side_px) {
   return scene;
 }
 
+std::vector<RayTable> rays_of(const SyntheticScene& scene) {
+  return {scene.rig.cameras.begin(), scene.rig.cameras.end()};
+}
+
 SyntheticFrames sweep_over(const SyntheticScene& scene, const Sweep& sweep) {
   SyntheticFrames made{
       Light(TranslatingPlane{Eigen::Vector3d::UnitY(), begin_mm, (end_mm - begin_mm) / sweep.count}), {}, {}};

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "pagesweep/camera/ray_table.h"
 #include "pagesweep/camera/rig.h"
 #include "pagesweep/data/frames.h"
 #include "pagesweep/data/point_map.h"
@@ -20,6 +21,9 @@ struct SyntheticScene {
 /// \param side_px  of the square pictures: the middle of what cameras of 1024 x 1024 would see, so that a picture of
 ///                 another size has more pixels and not finer ones
 SyntheticScene make_scene(int side_px);
+
+/// Both cameras' viewing rays.
+std::vector<RayTable> rays_of(const SyntheticScene& scene);
 
 /// How the stripe passes over the scene.
 struct Sweep {
